@@ -1,5 +1,5 @@
-//! The programs start at reset and have the whole flash. The stack has all of RAM that is left: canopen-rs makes its dictionary there.
-//! zencan's dictionary is generated from its description.
+//! The programs start at reset and have the whole flash. The stack has all remaining RAM, because canopen-rs makes its
+//! dictionary there. zencan's dictionary is generated from its description.
 
 use std::path::Path;
 use std::{env, fs};

@@ -1,9 +1,9 @@
-//! The content of the domain object: what a block download brings, a block upload gives back.
+//! The content of the domain object: a block upload returns the data of the last block download.
 
 /// One block of 127 segments of 7 bytes.
 const CAPACITY: usize = 889;
 
-/// Up to one block of data, owned by the application in every program.
+/// Up to one block of data. In every program the application owns it.
 #[derive(Debug)]
 pub struct Domain {
     bytes: [u8; CAPACITY],
@@ -11,19 +11,19 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// An empty one.
+    /// An empty domain.
     #[must_use]
     pub const fn new() -> Domain {
         Domain { bytes: [0; CAPACITY], len: 0 }
     }
 
-    /// What is in it.
+    /// The content.
     #[must_use]
     pub fn content(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Takes a part of new content, and ends it there; `false` when there is no room.
+    /// Writes a part of new content, which ends there for now; `false` if there is no room.
     pub fn write(&mut self, offset: usize, part: &[u8]) -> bool {
         let end = offset.saturating_add(part.len());
         let Some(place) = self.bytes.get_mut(offset..end) else { return false };

@@ -1,8 +1,8 @@
-//! What the programs share: how the host makes them do one operation and counts it.
+//! Common parts of the programs: the host makes a program do one operation and counts its instructions.
 //!
-//! The host is the bus and the client. Each request is a command and a frame in registers that the emulated machine
-//! has in place of peripherals. The count runs from the frame in the node's own type to the frame handed to the
-//! driver: it stands still while the driver has a frame, so the driver of one node is no cheaper than that of another.
+//! The host is the bus and the client. Each request is a command and a frame in registers, which the emulated machine
+//! has in place of peripherals. The count runs from the frame in the node's own type to the frame given to the driver.
+//! It is stopped while the driver has a frame, so the cost of the driver is the same for all nodes.
 #![no_std]
 
 mod domain;
@@ -20,19 +20,19 @@ pub struct Bits {
     pub id: u16,
     /// Data length code.
     pub len: usize,
-    /// The data, then anything.
+    /// The data; bytes beyond the length are undefined.
     pub data: [u8; 8],
 }
 
-/// Something to be measured. Times are microseconds since start-up.
+/// A node to be measured. Times are microseconds since start-up.
 pub trait Node {
-    /// Its type of a frame.
+    /// The node's type for a frame.
     type Frame: From<Bits>;
 
-    /// Time has passed, nothing has come.
+    /// Time has passed without a frame.
     fn pass(&mut self, now: u64);
 
-    /// A frame that may be anybody's, up to the point where it is known for whom it is.
+    /// A frame that may be for any node, up to the point where its receiver is known.
     fn sort(&mut self, frame: Self::Frame, now: u64);
 
     /// NMT, SYNC or RPDO, up to the next deadline.
@@ -41,11 +41,11 @@ pub trait Node {
     /// Any other frame of this node, up to the next deadline.
     fn serve(&mut self, frame: Self::Frame, now: u64);
 
-    /// The application reports a fault and changes values. Not measured: it is here to be part of the size.
+    /// The application reports a fault and changes values. Not measured: only part of the program's size.
     fn disturb(&mut self, now: u64);
 }
 
-/// Does what the host asks for.
+/// Carries out the host's requests.
 pub fn run<N: Node>(node: &mut N) -> ! {
     loop {
         let Request { command, now, frame } = registers::request();
@@ -64,7 +64,7 @@ pub fn run<N: Node>(node: &mut N) -> ! {
     }
 }
 
-/// The driver: takes a frame. `bits` makes it fit the registers; that is not counted.
+/// The driver: takes a frame. `bits` converts the frame for the registers; the conversion is not counted.
 #[inline(never)]
 pub fn transmit<F>(frame: &F, bits: impl FnOnce(&F) -> Bits) -> bool {
     registers::count(false);

@@ -1,29 +1,29 @@
-//! The registers between the program and the host. `emulator/bench` has the other end, at the same addresses.
+//! The registers between the program and the host. `emulator/bench` has the other side, at the same addresses.
 
 use core::ptr;
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use crate::Bits;
 
-/// Where they begin; nothing else is there.
+/// Start of the registers; nothing else is there.
 const BASE: usize = 0x4000_0000;
 
-/// The request: read by the program.
+/// The request, read by the program.
 const COMMAND: usize = BASE;
 const NOW: [usize; 2] = [BASE + 0x04, BASE + 0x08];
 const RECEIVED: usize = BASE + 0x10;
-/// A frame for the bus: the identifier is written last.
+/// A frame for the bus; its identifier is written last.
 const SENT: usize = BASE + 0x20;
 /// Whether the frame was taken.
 const TAKEN: usize = BASE + 0x30;
-/// 1 lets the count run, 0 stops it.
+/// Writing 1 starts the count, 0 stops it.
 const COUNT: usize = BASE + 0x40;
-/// Anything: the request is done.
+/// Any write: the request is done.
 const DONE: usize = BASE + 0x44;
-/// Anything: the program has panicked.
+/// Any write: the program has panicked.
 const PANICKED: usize = BASE + 0x48;
 
-/// What the host asks for.
+/// Commands of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// The empty loop, which is subtracted from the others.
@@ -43,11 +43,11 @@ pub enum Command {
 /// A request of the host.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
-    /// What to do.
+    /// The command.
     pub command: Command,
-    /// When, in microseconds.
+    /// Time in microseconds.
     pub now: u64,
-    /// With which frame; meaningless where the command takes none.
+    /// The frame; meaningless if the command needs none.
     pub frame: Bits,
 }
 
@@ -72,7 +72,7 @@ fn received() -> Bits {
     Bits { id: id as u16, len: len as usize, data }
 }
 
-/// Puts a frame on the bus; whether there was room.
+/// Puts a frame on the bus; returns whether there was room.
 pub(crate) fn transmit(frame: Bits) -> bool {
     let [a, b, c, d, e, f, g, h] = frame.data;
     write(SENT + 12, u32::from_le_bytes([e, f, g, h]));
@@ -82,8 +82,8 @@ pub(crate) fn transmit(frame: Bits) -> bool {
     read(TAKEN) != 0
 }
 
-/// Lets the count run, or stops it. A function of its own, so that it ends a block of code: the emulator counts by
-/// blocks, and so the count begins and ends with the return from here.
+/// Starts or stops the count. A function of its own, so that it ends a block of code: the emulator counts by blocks, so
+/// the count begins and ends with the return from this function.
 #[inline(never)]
 pub(crate) fn count(runs: bool) {
     compiler_fence(Ordering::SeqCst);
@@ -106,6 +106,6 @@ fn read(address: usize) -> u32 {
 }
 
 fn write(address: usize, value: u32) {
-    // SAFETY: as for `read`; no memory of the program lies there.
+    // SAFETY: as in `read`; no memory of the program lies there.
     unsafe { ptr::with_exposed_provenance_mut::<u32>(address).write_volatile(value) }
 }

@@ -4,14 +4,14 @@ use canopen::dictionary::{Access, Dictionary, Object, Type};
 use canopen::objects;
 use update::AUTHORISATION_KEY;
 
-/// 'BOOT': what 1000h reads in a bootloader.
+/// 'BOOT': the device type (1000h) of a bootloader.
 const BOOT: u32 = 0x424F_4F54;
 
 const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
     Object::new(index, sub, name, kind, Access::ReadOnly)
 }
 
-/// Who may change the program: in a bootloader with a key for that.
+/// Permission to change the program, in a bootloader with an authorisation key.
 const AUTHORISATION: &[Object] = if AUTHORISATION_KEY.is_some() {
     &[
         Object::highest(0x2003, 3, "Program authorisation"),

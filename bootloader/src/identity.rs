@@ -1,4 +1,4 @@
-//! Where the node is on the bus: what the last start has left in RAM, else what is stored in the device record.
+//! Node-ID and bit rate of the node: from the note of the last start in RAM, otherwise from the device record.
 
 use bsp::bit_timing::BitTiming;
 use bsp::handover::Handover;
@@ -6,15 +6,15 @@ use bsp::memory::{PARAMETER_PAGE, parameter_pages};
 use canopen::NodeId;
 use storage::{DeviceRecord, Memory, Pages};
 
-/// Where a node is found of which nothing is known.
+/// Node-ID of a node without any data.
 const NODE_ID: Option<NodeId> = NodeId::new(126);
 
 /// Node-ID and bit rate.
 #[derive(Clone, Copy)]
 pub(crate) struct Identity {
-    /// `None` for a node that waits for LSS to give it one.
+    /// `None` for a node that waits for LSS to assign one.
     pub(crate) node_id: Option<NodeId>,
-    /// `None` where it has to be found.
+    /// `None` if the bit rate has to be detected.
     pub(crate) timing: Option<BitTiming>,
 }
 
@@ -30,7 +30,7 @@ impl Identity {
     }
 }
 
-/// The device record that LSS or the factory has stored.
+/// The device record stored by LSS or the factory.
 fn stored() -> Option<DeviceRecord> {
     storage::device_record(&mut Memory(parameter_pages()), Pages::new(0, PARAMETER_PAGE))
 }

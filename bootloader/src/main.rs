@@ -1,5 +1,5 @@
-//! The bootloader (CiA 302-3): it starts the application, or takes a new one from the bus. All of it runs from RAM
-//! (bootloader.x), vectors included, so that it answers while the flash erases.
+//! The bootloader (CiA 302-3): it starts the application, or receives a new one from the bus. All of its code runs from
+//! RAM (bootloader.x), vectors included, so that it responds while the flash erases.
 //!
 //! | priority | task | why there |
 //! |---|---|---|
@@ -19,7 +19,7 @@ mod start;
 mod target;
 mod visit;
 
-/// Without a record of the place: the names of all of them would take 3 KiB.
+/// Without a record of the location, because the names of all source files would take 3 KiB.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     cortex_m::peripheral::SCB::sys_reset()
@@ -38,7 +38,7 @@ mod app {
     use crate::session::Session;
     use crate::start::{self, Outcome};
 
-    /// A whole block of 127 segments, and what may come beside it: programming may fall behind the bus by a block.
+    /// Room for a whole block of 127 segments and other frames: programming may fall behind the bus by a block.
     const BLOCK: usize = 160;
 
     #[shared]
@@ -92,7 +92,7 @@ mod app {
         cx.local.receiver.drain();
     }
 
-    /// An error ends the sleep of a guest.
+    /// Wakes the guest at an error on the bus.
     #[task(binds = CAN1_SCE, priority = 1)]
     fn bus_error(_: bus_error::Context) {
         bsp::can::acknowledge_error();

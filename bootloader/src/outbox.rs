@@ -1,13 +1,13 @@
-//! What waits for a mailbox: in the order in which it was said. The bootloader sends no process data that would have to go
+//! Frames that wait for a mailbox, in the order of sending. The bootloader sends no process data that would have to go
 //! first.
 
 use bsp::Transmitter;
 use canopen::{Frame, QueueFull, Transmit};
 
-/// A response, a heartbeat, LSS, and as much again: whoever asks waits for the answer.
+/// A response, a heartbeat, LSS, and as much again: a client waits for the answer before it sends the next request.
 const CAPACITY: usize = 8;
 
-/// The queue: a ring.
+/// The queue, a ring buffer.
 pub(crate) struct Outbox {
     frames: [Option<Frame>; CAPACITY],
     first: usize,
@@ -18,7 +18,7 @@ impl Outbox {
         Outbox { frames: [None; CAPACITY], first: 0 }
     }
 
-    /// Drops what waits.
+    /// Drops all waiting frames.
     pub(crate) fn clear(&mut self) {
         self.frames.iter_mut().for_each(|place| *place = None);
     }

@@ -1,4 +1,4 @@
-//! The program as the bus sees it: what a master's commands do, and what the objects of CiA 302-3 read.
+//! The program on the bus: effects of a master's commands, and values of the objects of CiA 302-3.
 
 use bsp::{ProgramFlash, board, factory};
 use canopen::dictionary::{Entry, Field};
@@ -9,7 +9,7 @@ use update::{AUTHORISATION_KEY, Authorisation, Proof, Refusal, Updater};
 use crate::dictionary::DICTIONARY;
 use crate::target::{PRODUCT, REVISION, TARGET, VENDOR};
 
-/// What 1F51h takes (CiA 302-3).
+/// Commands of 1F51h (CiA 302-3).
 const STOP: u8 = 0;
 const START: u8 = 1;
 const RESET: u8 = 2;
@@ -24,18 +24,18 @@ const IDENTITY: [Field; 4] = [
 ];
 const PROGRAM_CONTROL: Field = DICTIONARY.field(0x1F51, 1);
 const STATUS: Field = DICTIONARY.field(0x1F57, 1);
-/// State and challenge, in a bootloader with a key.
+/// State and challenge, in a bootloader with an authorisation key.
 const AUTHORISATION: Option<[Field; 2]> = if AUTHORISATION_KEY.is_some() {
     Some([DICTIONARY.field(0x2003, 1), DICTIONARY.field(0x2003, 2)])
 } else {
     None
 };
 
-/// The update under way, as the application of the CANopen device.
+/// The update in progress, as the application of the CANopen device.
 pub(crate) struct Program {
     updater: Updater<ProgramFlash>,
     authorisation: Authorisation,
-    /// The program was told to start, and there is one.
+    /// The program was told to start, and may be started.
     starts: bool,
 }
 
@@ -48,12 +48,12 @@ impl Program {
         &mut self.updater
     }
 
-    /// Whether the application is to be started.
+    /// Whether the application must be started.
     pub(crate) fn starts(&self) -> bool {
         self.starts
     }
 
-    /// What the objects of the program read now. 1F56h reads 0: no program runs.
+    /// Writes the present values of the program's objects. 1F56h stays 0, because no program runs.
     pub(crate) fn show(&self, image: &mut [u8]) {
         PROGRAM_CONTROL.store(image, [STOP]);
         STATUS.store(image, self.updater.status().word().to_le_bytes());
@@ -63,7 +63,7 @@ impl Program {
         }
     }
 
-    /// Refuses whoever has not answered the challenge, where a key is set.
+    /// Refuses a change of the program until the challenge has been answered, if a key is set.
     fn admit(&self) -> Result<(), Abort> {
         if AUTHORISATION_KEY.is_none() || self.authorisation.is_open() {
             Ok(())
@@ -75,7 +75,7 @@ impl Program {
     fn control(&mut self, command: u8) -> Result<(), Abort> {
         self.admit()?;
         match command {
-            // The program is stopped, and at its beginning.
+            // The program is stopped and reset already.
             STOP | RESET => Ok(()),
             START => self.start(),
             CLEAR => self.updater.clear().map_err(abort),
@@ -99,7 +99,7 @@ impl Program {
 }
 
 impl Application for Program {
-    /// The longest entry is a name.
+    /// Block upload is off: the longest readable value is a short text.
     const BLOCK_UPLOAD: bool = false;
 
     fn initialise(&mut self, image: &mut [u8]) {
@@ -111,7 +111,7 @@ impl Application for Program {
         self.show(image);
     }
 
-    /// 1F51h:1 is handled, and in a bootloader with a key 2003h:3, which has eight bytes.
+    /// Handles 1F51h:1 and, in a bootloader with a key, 2003h:3, which has eight bytes.
     fn write(&mut self, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         match bytes {
             &[command] => self.control(command),
@@ -120,7 +120,7 @@ impl Application for Program {
         }
     }
 
-    /// 1F50h:1 is the one domain.
+    /// Handles 1F50h:1, the only domain.
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         self.admit()?;
         let updater = &mut self.updater;
@@ -133,7 +133,7 @@ impl Application for Program {
     }
 }
 
-/// What a refusal is to the SDO client; 1F57h says more.
+/// The abort code of a refusal for the SDO client; 1F57h has the details.
 fn abort(refusal: Refusal) -> Abort {
     match refusal {
         Refusal::NotCleared | Refusal::Unspecified => Abort::DeviceState,

@@ -1,4 +1,4 @@
-//! The one loop of the bootloader.
+//! The main loop of the bootloader.
 
 use bsp::led::Led;
 use bsp::transmit_queue::Mailboxes;
@@ -11,10 +11,10 @@ use crate::outbox::Outbox;
 use crate::session::{Session, Then};
 use crate::visit::Visit;
 
-/// Frames wait for a mailbox: no interrupt tells when one is free.
+/// Polling interval while frames wait for a mailbox, because no interrupt signals a free mailbox.
 const TRANSMIT_POLL: Duration = Duration::from_millis(1);
 
-/// What the loop owns.
+/// The data that the loop owns.
 pub(crate) struct Run {
     pub(crate) session: Session,
     pub(crate) identity: Identity,
@@ -54,8 +54,8 @@ impl Run {
         }
     }
 
-    /// Sleeps until then, or until a frame comes. Interrupts that are masked still end the sleep; what comes between the
-    /// look at the queue and the sleep is not slept over.
+    /// Sleeps until a time, or until a frame comes. Masked interrupts also end the sleep, so an event between the check
+    /// of the queue and the sleep is not missed.
     fn sleep(&mut self, until: Instant) {
         let soon = Clock::now() + TRANSMIT_POLL;
         let until = if self.queue.is_empty() { until } else { until.min(soon) };
@@ -67,7 +67,7 @@ impl Run {
         });
     }
 
-    /// Resets the chip once everything is on the wire.
+    /// Resets the chip once all frames have been sent, or at `latest`.
     fn reset(&mut self, latest: Instant) {
         let all_is_said = self.queue.is_empty() && self.transmitter.is_idle();
         if all_is_said || Clock::now() >= latest {
@@ -76,7 +76,7 @@ impl Run {
     }
 }
 
-/// Two short flashes and a pause, in a little more than a second: 2^17 us each.
+/// Two short flashes and a pause in a little more than a second, in steps of 2^17 us.
 fn blink(now: Instant) -> bool {
     matches!(now.0 >> 17 & 7, 0 | 2)
 }

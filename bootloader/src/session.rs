@@ -1,4 +1,4 @@
-//! The bootloader on the bus: the CANopen device, the update, and what one asks of the other.
+//! The bootloader on the bus: the CANopen device, the update, and the actions between them.
 
 use core::iter::{empty, once};
 
@@ -20,33 +20,33 @@ use crate::program::Program;
 use crate::start::Reason;
 use crate::target::TARGET;
 
-/// The loop comes by at least this often: a recovery of the bus raises no interrupt.
+/// The loop runs at least this often, because a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
-/// While a sector erases by itself.
+/// Polling interval while a sector is being erased.
 const ERASE_POLL: Duration = Duration::from_millis(1);
-/// How long a reset waits for what is still to be sent, on a bus where nobody acknowledges.
+/// Time for which a reset waits for unsent frames, on a bus where nobody acknowledges.
 const FAREWELL: Duration = Duration::from_millis(20);
 
-/// Everything but the queues.
+/// Everything except the queues.
 pub(crate) struct Session {
     device: canopen::service_device!(Program, ROWS),
     can: Controller,
     timing: BitTiming,
     back_off: BackOff,
-    /// A copy that an earlier start has begun is being finished: after the copy the application starts, if there is one.
+    /// A copy begun by an earlier start is being finished. Afterwards the application is started, if it is valid.
     is_resuming: bool,
-    /// The chip is to be reset, at the latest then.
+    /// The chip must be reset, at this time at the latest.
     reset: Option<Instant>,
 }
 
-/// What the loop does next.
+/// Next action of the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Then {
-    /// Comes by again at once.
+    /// Runs again at once.
     Again,
-    /// Sleeps until then.
+    /// Sleeps until this time.
     Sleep(Instant),
-    /// Resets the chip when the queue is empty, and at the latest then.
+    /// Resets the chip when the queue is empty, at this time at the latest.
     Reset(Instant),
 }
 
@@ -76,7 +76,7 @@ impl Session {
         }
     }
 
-    /// Goes on the bus at a rate, or listens at one. What was to be sent before is not sent any more.
+    /// Goes on the bus at a rate, or listens at one. Frames that were waiting are dropped.
     pub(crate) fn go(&mut self, step: Step, out: &mut Outbox) {
         out.clear();
         match step {
@@ -90,20 +90,20 @@ impl Session {
         self.can.watch_errors();
     }
 
-    /// Frames and errors that the controller has heard since the last call.
+    /// Frames and errors that the controller has seen since the last call.
     pub(crate) fn heard(&mut self) -> Heard {
         self.can.heard()
     }
 
-    /// Starts the communication. The controller joins last: what it acknowledges is answered.
+    /// Starts the communication. The controller joins last, so that every acknowledged frame is also answered.
     fn join(&mut self, out: &mut Outbox) {
-        // What follows is left to the next poll.
+        // The resulting actions are left to the next poll.
         let _ = self.device.start(Clock::now(), out);
         self.can.start(self.timing, &self.banks());
         self.note();
     }
 
-    /// A frame has come: each of the two takes what is its own.
+    /// Handles a received frame.
     pub(crate) fn take(&mut self, received: &Received, out: &mut Outbox) {
         let Received { frame, at } = received;
         let next = self.device.on_frame(frame, *at, out);
@@ -111,7 +111,7 @@ impl Session {
         self.fulfil(next, out);
     }
 
-    /// One step of everything.
+    /// Does one step of everything.
     pub(crate) fn step(&mut self, out: &mut Outbox) -> Then {
         let now = Clock::now();
         self.watch_bus(now);
@@ -126,7 +126,7 @@ impl Session {
         }
     }
 
-    /// One step of the update. An image that is good is copied at once: 1F57h is busy until it can be started.
+    /// Does one step of the update. A valid image is copied at once: 1F57h is busy until the image can be started.
     fn advance(&mut self, now: Instant) -> Next {
         let program = self.device.application_mut();
         let mut next = program.updater().poll();
@@ -143,11 +143,11 @@ impl Session {
         next
     }
 
-    /// The copy of an earlier start is finished or was refused: the application starts in either case, if the application is good.
+    /// The copy of an earlier start is finished or was refused: starts the application in either case, if it is valid.
     fn start_if_good(&mut self, now: Instant) {
         let updater = self.device.application_mut().updater();
         if updater.phase() == Phase::Installed {
-            // What was counted were the crashes of another image.
+            // The crash count belonged to another image.
             retained::set_crashes(Crashes::default());
         }
         let start = Start { crashes: retained::crashes(), proof: Proof::Waived, ..Start::default() };
@@ -161,7 +161,8 @@ impl Session {
         self.device.show(|program, image| program.show(image));
     }
 
-    /// Does what a call leaves to the bootloader, until nothing is left; when the next call is due.
+    /// Carries out the actions that a call leaves to the bootloader, until none is left. Returns the time of the next
+    /// call.
     fn fulfil(&mut self, mut next: canopen::Next, out: &mut Outbox) -> Instant {
         while let Some(action) = next.action {
             match action {
@@ -174,7 +175,7 @@ impl Session {
                     self.note();
                     self.filter();
                 }
-                // The parameters are the application's.
+                // The parameters belong to the application.
                 Action::Store(_) => (),
             }
             next = self.device.poll(Clock::now(), out);
@@ -190,7 +191,7 @@ impl Session {
         self.reset.get_or_insert(Clock::now() + FAREWELL);
     }
 
-    /// Where the node is on the bus, for the next start.
+    /// Notes node-ID and bit rate for the next start.
     fn note(&self) {
         let node_id = self.device.node_id().map(NodeId::get);
         retained::hand_over(&Handover { node_id, timing: self.timing, stay: false });
@@ -209,7 +210,7 @@ impl Session {
         self.can.set_filters(&self.banks());
     }
 
-    /// NMT, SDO and LSS, all of them to FIFO 1: there is nothing else, and a client waits for its answers.
+    /// Filters for NMT, SDO and LSS, all to FIFO 1: there are no other frames, and a client waits for its answers.
     fn banks(&self) -> Banks {
         let ids = once(CanId::NMT).chain(self.device.service_ids());
         filters::pack(empty(), ids.map(CanId::get))

@@ -12,19 +12,19 @@ use crate::target::TARGET;
 /// Why the bootloader stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reason {
-    /// It was asked to, or there is no application that may be started: what 1F57h reads.
+    /// On request, or because there is no application that may be started; with the value of 1F57h.
     Stay(Status),
     /// A checked image waits to be copied.
     Copy,
-    /// The image before the one in place is to come back.
+    /// The previous image must be restored.
     Revert,
 }
 
-/// What a start has come to.
+/// Result of the decision.
 pub(crate) enum Outcome {
     /// Start the application.
     Application(Vectors),
-    /// Stay, for this reason, with what was left in RAM.
+    /// Stay for this reason; with the note that was left in RAM.
     Stay(Reason, Option<Handover>),
 }
 
@@ -63,13 +63,15 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
     }
 }
 
-/// Challenge and response of this start. The pair of the start before is part of the noise: without a power cut none comes again.
+/// Challenge and response of this start. The pair of the previous start is part of the noise, so without a power cut no
+/// pair repeats.
 #[inline(never)]
 fn pair(key: &[u8; KEY_LEN]) -> Pair {
     Pair::new(key, &memory::noise::<256>(), factory::serial_number())
 }
 
-/// Who may change the program: whoever the application has sent the node here for, or else who answers.
+/// The authorisation of this start. It is given already if the application has requested the bootloader; otherwise a
+/// client must answer the challenge.
 pub(crate) fn authorisation(note: Option<Handover>) -> Authorisation {
     let pair = AUTHORISATION_KEY.and_then(|_| retained::authorisation());
     Authorisation::new(pair, note.is_some_and(|note| note.stay))
@@ -79,14 +81,14 @@ fn stay(why: Stay, note: Option<Handover>) -> Outcome {
     Outcome::Stay(Reason::Stay(why.status()), note)
 }
 
-/// An application that a debugger has put there: vectors that can be, and no header at all. A bootloader for development starts it.
+/// An application written by a debugger: valid vectors and no header at all. Only a development bootloader starts it.
 #[cfg(feature = "development")]
 pub(crate) fn unsigned() -> Option<Vectors> {
     let vectors = application::vectors().filter(|_| application::has_no_header());
     vectors.inspect(|_| retained::set_proof(application::SEAL_OF_NO_HEADER))
 }
 
-/// Nothing starts that was not signed.
+/// Unsigned applications are not started.
 #[cfg(not(feature = "development"))]
 pub(crate) fn unsigned() -> Option<Vectors> {
     None

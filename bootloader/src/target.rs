@@ -1,4 +1,4 @@
-//! What this node is: what the identity object says, and which images it takes.
+//! Properties of this node: for the identity object, and for the check of images.
 
 use bsp::update_layout::LAYOUT;
 use update::Target;

@@ -1,10 +1,10 @@
-//! Links an image into its region of memory.x. The build scripts of the images take this file in by its path.
+//! Links an image into its region of memory.x. The build scripts of the images include this file by its path.
 
 use std::path::Path;
 use std::{env, fs};
 
-/// Writes the `image.x` that memory.x includes, and tells the linker about both. `region` is where the image lies; `script`
-/// is that of cortex-m-rt, or one in the directory of the image.
+/// Writes the `image.x` that memory.x includes, and passes both to the linker. `region` is the region of the image;
+/// `script` is the script of cortex-m-rt, or one in the directory of the image.
 pub(crate) fn image(region: &str, script: &str) {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = here.join("..");

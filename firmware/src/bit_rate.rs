@@ -1,4 +1,4 @@
-//! At which bit rate the node runs: the stored one, or the one that it finds as a guest who listens (`bsp::guest`).
+//! The bit rate of the node: the stored one, or one that is detected by listening as a guest (`bsp::guest`).
 
 use bsp::Frames;
 use bsp::bit_rate_detection::{Heard, Step};
@@ -8,20 +8,20 @@ use bsp::guest::Guest;
 use canopen::Instant;
 use node::BitRate;
 
-/// The timing of the bus, once it is known.
+/// The bit timing of the bus, or the state of its detection.
 pub(crate) enum Rate {
-    /// This one.
+    /// The timing is known.
     Known(BitTiming),
-    /// A search is to begin: automatic detection.
+    /// Automatic detection is configured; the search must be started.
     Unknown,
-    /// None is stored: a silent bus is listened to at the one of a node as delivered, any other bus is searched.
+    /// No rate is stored: the node waits on a silent bus at the default rate, and searches on any other bus.
     Missing,
-    /// A search is going on.
+    /// The search is in progress.
     Searched(Guest),
 }
 
 impl Rate {
-    /// From what is configured.
+    /// From the configured bit rate.
     pub(crate) fn of(bit_rate: BitRate) -> Rate {
         match BitTiming::of(bit_rate.kbit()) {
             Some(timing) => Rate::Known(timing),
@@ -29,7 +29,7 @@ impl Rate {
         }
     }
 
-    /// Begins the search.
+    /// Starts the search.
     pub(crate) fn search(&mut self, can: &mut Controller, frames: &mut Frames, now: Instant) {
         defmt::info!("looking for the bit rate");
         let (guest, step) = match self {
@@ -43,10 +43,10 @@ impl Rate {
         *self = Rate::Searched(guest);
     }
 
-    /// Goes on with the search, if one is going on. True when the search has come to its end. Takes all frames.
+    /// Continues a search in progress. True when the search has ended. Takes all frames.
     ///
-    /// A frame counts for the rate at which the controller has listened to it. The controller changes its rate at the end of the
-    /// frame that is on the bus, so the last frame of a rate may come when the change is already asked for.
+    /// A frame counts for the rate at which the controller received it. The controller changes its rate at the end of
+    /// the frame that is on the bus, so the last frame at a rate may arrive after the change was requested.
     pub(crate) fn go_on(&mut self, can: &mut Controller, frames: &mut Frames, now: Instant) -> bool {
         let Rate::Searched(guest) = self else { return false };
         let heard = if frames.dequeue().is_some() { Heard::Frame } else { can.heard() };

@@ -1,9 +1,9 @@
-//! What a change of the bus state means to the protocol.
+//! Events of the protocol for changes of the bus state.
 
 use bsp::bus_state::BusState;
 use node::BusEvent;
 
-/// The event, if it is one; said in the log as well.
+/// The event for a change, if there is one; also written to the log.
 pub(crate) fn event_of(before: BusState, after: BusState) -> Option<BusEvent> {
     match (before, after) {
         (_, BusState::Off) => {

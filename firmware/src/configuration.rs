@@ -1,39 +1,41 @@
-//! Who this node is: what the parameter store and the chip say of it.
+//! Configuration of the node, from the parameter store and from the chip.
 
 use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
 use bsp::update_layout::LAYOUT;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
-use node::{BitRate, Fault, Identity, LastingRecord, NodeId, Parameters, Personality, Protocol, Setup};
-use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
+use node::{
+    BitRate, Fault, Identity, NodeId, Parameters, Personality, Protocol, Setup, StoredPositionRecord,
+};
+use profiles::board::{ChipThermometer, POSITION_RECORD_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 use update::{Authorisation, Trial};
 
 use crate::bit_rate::Rate;
 
-/// Where the store has nothing to say: node-ID 1, pressure, the bit rate of whoever speaks first, 250 kbit/s.
+/// Defaults without a stored value: node-ID 1, pressure, the detected bit rate or 250 kbit/s.
 const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
 const DEFAULT_BIT_RATE: u16 = 250;
 const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);
 
-/// The node as it is stored.
+/// The node with its stored data.
 pub(crate) struct Loaded {
     pub(crate) protocol: &'static mut Protocol,
-    /// Those of the measurement.
+    /// Parameters of the measurement.
     pub(crate) parameters: Parameters,
     pub(crate) setup: Setup,
     /// The stored bit rate, if one is stored.
     pub(crate) rate: Rate,
-    /// What is wrong with the device record.
+    /// The fault of the device record, if there is one.
     pub(crate) boot_data: Option<&'static Fault>,
-    /// Ready to store; `None` where nothing can be stored.
+    /// The prepared store; `None` if nothing can be stored.
     pub(crate) store: Option<Store<ParameterFlash>>,
-    /// What is stored of what the measurement retains.
-    pub(crate) lasting: Option<[u32; LASTING_WORDS]>,
+    /// The stored record about the retained state.
+    pub(crate) position_record: Option<[u32; POSITION_RECORD_WORDS]>,
 }
 
-/// Makes the protocol in its place, with what is stored of it. Without a store that works, the node runs with its defaults.
+/// Makes the protocol in its place, with its stored data. Without a working store, the node runs with its defaults.
 pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protocol>) -> Loaded {
     let mut view = match View::open(flash, PAGES) {
         Ok(view) => view,
@@ -43,7 +45,15 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
             let protocol = make(place, &setup);
             let parameters = protocol.load_defaults();
             let rate = Rate::Missing;
-            return Loaded { protocol, parameters, setup, rate, boot_data: None, store: None, lasting: None };
+            return Loaded {
+                protocol,
+                parameters,
+                setup,
+                rate,
+                boot_data: None,
+                store: None,
+                position_record: None,
+            };
         }
     };
     let Identity { record, fault } = Identity::read(&mut view);
@@ -51,15 +61,15 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
     let rate = record.map_or(Rate::Missing, |_| Rate::of(setup.bit_rate));
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
-    let lasting = LastingRecord::read(&mut view);
+    let position_record = StoredPositionRecord::read(&mut view);
     let mut store = prepare(view);
     if let Some(store) = &mut store {
         protocol.set_trial(Trial::read(&mut store.flash().trial(), &LAYOUT));
     }
-    Loaded { protocol, parameters, setup, rate, boot_data: fault, store, lasting }
+    Loaded { protocol, parameters, setup, rate, boot_data: fault, store, position_record }
 }
 
-/// Not inlined: the stack on which the value is made is free again for what reads the flash.
+/// Not inlined, so that the stack on which the value is made is free again for reading the flash.
 #[inline(never)]
 fn make(place: &'static mut MaybeUninit<Protocol>, setup: &Setup) -> &'static mut Protocol {
     let protocol = place.write(Protocol::new(setup));
@@ -67,7 +77,7 @@ fn make(place: &'static mut MaybeUninit<Protocol>, setup: &Setup) -> &'static mu
     protocol
 }
 
-/// May erase pages: half a second in which the core stands still, so it is done before the node goes on the bus.
+/// May erase pages, which stops the core for half a second, so it is called before the node goes on the bus.
 fn prepare(view: View<ParameterFlash>) -> Option<Store<ParameterFlash>> {
     Store::prepare(view)
         .inspect_err(|error| defmt::error!("nothing can be stored: {=str}", reason(error)))
@@ -103,7 +113,7 @@ fn personality(number: u8) -> Personality {
     })
 }
 
-/// Says who starts, and why the last run ended; true when that was not meant to happen.
+/// Logs the start and the cause of the last reset. Returns true if the reset was unexpected.
 pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
     defmt::info!(
         "version {=str} on {=str}, serial {=u32:08x}, reset by {=str}",
@@ -126,13 +136,13 @@ pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
     crash.is_some() || cause.is_unexpected()
 }
 
-/// The temperature sensor in the chip, as its maker has measured it.
+/// The temperature sensor in the chip, with the manufacturer's calibration.
 pub(crate) fn thermometer() -> ChipThermometer {
     let (offset, slope) = factory::calibration().line();
     ChipThermometer { offset, slope }
 }
 
-/// The front end's sums as the measurement takes them.
+/// Converts the sums of the front end for the measurement.
 pub(crate) fn raw_sample(sums: &Sums) -> RawSample {
     let [pressure, supply, thermistor, temperature, reference] = sums.channels;
     RawSample { pressure, supply, temperature, reference, thermistor, count: Sums::COUNT }

@@ -1,5 +1,5 @@
-//! The application: wiring only. Every task is bound to one interrupt; a task that wants another one to look pends its
-//! interrupt. A task that is asked again while it runs then runs again, so no request is lost.
+//! The application: wiring only. Every task is bound to one interrupt; a task wakes another one by pending its
+//! interrupt. A task that is pended while it runs will run again, so no request is lost.
 //!
 //! | priority | task | why there |
 //! |---|---|---|
@@ -29,17 +29,17 @@ mod storage_task;
 use bsp::pac::Interrupt;
 use canopen::Duration;
 
-/// Pended by whoever has work for the process data task.
+/// Pended to wake the process data task.
 const PROCESS: Interrupt = Interrupt::TIM2;
-/// Pended by whoever has work for the services task.
+/// Pended to wake the services task.
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
-/// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
+/// Pended to wake the storage task. The interrupt belongs to a peripheral that the board does not use.
 const STORAGE: Interrupt = Interrupt::SDIO;
-/// Pended by whoever misses samples.
+/// Pended when samples are missing.
 const SAMPLING: Interrupt = Interrupt::DMA2_STREAM0;
-/// Pended by whoever has put a frame into the transmit queue.
+/// Pended after a frame was put into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
-/// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
+/// The node goes on the bus when its first sample has been taken, so that no PDO carries an older value.
 const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 
 #[panic_handler]
@@ -62,7 +62,7 @@ mod app {
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TimeInterrupt,
         Transmitter, Watchdog,
     };
-    use node::{LastingRecord, Measurement, Parameters, Protocol, StoreJob};
+    use node::{Measurement, Parameters, Protocol, StoreJob, StoredPositionRecord};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::configuration::Loaded;
@@ -78,10 +78,10 @@ mod app {
         protocol: &'static mut Protocol,
         transmit: TransmitQueue,
         snapshot: SnapshotSlot,
-        /// New ones, until the sampling task has taken them.
+        /// New parameters, until the sampling task has taken them.
         parameters: Option<Parameters>,
         watchdog: Watchdog,
-        /// What the last sample has retained.
+        /// The words retained by the last sample.
         retained: Retained,
     }
 
@@ -105,7 +105,7 @@ mod app {
         process_queue: ReceiveQueue = ReceiveQueue::new(),
         services_queue: ReceiveQueue = ReceiveQueue::new(),
         lost: Losses = Losses::new(),
-        // Too large to be handed around on the stack.
+        // Too large to be moved through the stack.
         protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
         measurement_place: MaybeUninit<Measurement> = MaybeUninit::uninit(),
         job: MaybeUninit<StoreJob> = MaybeUninit::uninit(),
@@ -113,10 +113,10 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, rate, boot_data, store, lasting } =
+        let Loaded { protocol, parameters, setup, rate, boot_data, store, position_record } =
             configuration::load(board.parameters, cx.local.protocol);
         let job = cx.local.job.write(StoreJob::new(setup.personality));
-        let storage = StorageTask::new(store, job, LastingRecord::new(lasting));
+        let storage = StorageTask::new(store, job, StoredPositionRecord::new(position_record));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working(), boot_data };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
@@ -144,8 +144,8 @@ mod app {
                 cx.local.measurement_place,
                 setup.personality,
                 board.reset_cause,
-                &board.found,
-                lasting,
+                &board.backup_state,
+                position_record,
             ),
             transmitter: board.transmitter,
             time: board.time,
@@ -185,7 +185,7 @@ mod app {
         rtic::pend(SERVICES);
     }
 
-    /// Once a millisecond, when the DMA controller has filled a half of its buffer.
+    /// Runs once a millisecond, when the DMA controller has filled a half of its buffer.
     #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup],
            shared = [snapshot, parameters, retained, &watchdog])]
     fn sample(mut cx: sample::Context) {

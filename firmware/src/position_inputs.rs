@@ -1,9 +1,9 @@
-//! The inputs of the position sensors, as the measurement takes them.
+//! The inputs of the position sensors, converted for the measurement.
 
 use bsp::{Counted, Ssi};
 use profiles::board::{Board, PositionInputs, RawEncoder, SsiFrame};
 
-/// What the sampling task owns of them.
+/// The parts of the inputs that the sampling task owns.
 pub(crate) struct PositionReader {
     ssi: Ssi,
     settings: PositionInputs,
@@ -15,13 +15,13 @@ impl PositionReader {
         PositionReader { ssi, settings: PositionInputs::default(), board }
     }
 
-    /// Reads what the parameters ask for, from the next millisecond on.
+    /// Takes the settings; they act from the next millisecond on.
     pub(crate) fn apply(&mut self, settings: PositionInputs) {
         self.settings = settings;
     }
 
-    /// What belongs to the millisecond of this count. A word of SSI is that of the last millisecond, and the next one is
-    /// started.
+    /// The readings for the millisecond of this count. The SSI word is that of the last millisecond, and the next word
+    /// is started.
     pub(crate) fn read(&mut self, counted: Counted) -> RawEncoder {
         if !self.settings.are_used {
             return RawEncoder::default();

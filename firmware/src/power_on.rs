@@ -1,30 +1,31 @@
-//! The position through a loss of power: back from the memory that a battery keeps.
+//! The position after a loss of power, restored from the battery-backed memory.
 
 use core::mem::MaybeUninit;
 
+use bsp::backup_copies::BackupState;
 use bsp::battery::Battery;
-use bsp::kept::Found;
 use bsp::reset_cause::ResetCause;
 use node::{Measurement, Personality};
-use profiles::board::{LASTING_WORDS, PowerOn, Retained};
+use profiles::board::{POSITION_RECORD_WORDS, PowerOn, Retained};
 
 use crate::configuration;
 
-/// Makes the measurement in its place. Not inlined: the stack on which the value is made is free again after it.
+/// Makes the measurement in its place. Not inlined, so that the stack on which the value is made is free again
+/// afterwards.
 #[inline(never)]
 pub(crate) fn make(
     place: &'static mut MaybeUninit<Measurement>,
     personality: Personality,
     cause: ResetCause,
-    found: &Found,
-    stored: Option<[u32; LASTING_WORDS]>,
+    backup: &BackupState,
+    stored: Option<[u32; POSITION_RECORD_WORDS]>,
 ) -> &'static mut Measurement {
-    place.write(Measurement::new(personality, &power_on(cause, found, stored)))
+    place.write(Measurement::new(personality, &power_on(cause, backup, stored)))
 }
 
-/// Whether the battery has failed; what the start tells of the battery is in the log as well.
-fn battery_failed(cause: ResetCause, found: &Found) -> bool {
-    let battery = Battery::after(cause, found);
+/// Whether the battery has failed; the state of the battery is also logged.
+fn battery_failed(cause: ResetCause, backup: &BackupState) -> bool {
+    let battery = Battery::after(cause, backup);
     match battery {
         Battery::Unknown => {}
         Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
@@ -35,19 +36,23 @@ fn battery_failed(cause: ResetCause, found: &Found) -> bool {
     battery == Battery::Lost
 }
 
-/// What the board knows when the power comes.
+/// State of the board at power-on.
 ///
-/// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
-/// an empty one. The parameter store tells the two apart: a new board has no record of the positions.
-fn power_on(cause: ResetCause, found: &Found, stored: Option<[u32; LASTING_WORDS]>) -> PowerOn {
-    let retained = match found {
-        Found::Nothing => Retained::Nothing,
-        Found::Kept(words) => Retained::Words(*words),
-        Found::Damaged => {
+/// An empty backup SRAM means a new board or, after a loss of power, a board with no battery or an empty one. The
+/// parameter store distinguishes the two: a new board has no record of the positions.
+fn power_on(
+    cause: ResetCause,
+    backup: &BackupState,
+    stored: Option<[u32; POSITION_RECORD_WORDS]>,
+) -> PowerOn {
+    let retained = match backup {
+        BackupState::Nothing => Retained::Nothing,
+        BackupState::Intact(words) => Retained::Words(*words),
+        BackupState::Damaged => {
             defmt::error!("what was kept of the encoder is damaged");
             Retained::Damaged
         }
     };
-    let battery_failed = battery_failed(cause, found);
+    let battery_failed = battery_failed(cause, backup);
     PowerOn { thermometer: configuration::thermometer(), retained, stored, battery_failed }
 }

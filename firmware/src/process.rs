@@ -1,5 +1,5 @@
-//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps. And the one who notices
-//! that there are no more snapshots.
+//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps. Also
+//! detects that snapshots are missing.
 
 use bsp::losses::{Event, Losses};
 use bsp::{Alarm, Clock, Frames, Lamps, Received, Ring};
@@ -10,17 +10,17 @@ use crate::shared::Shared;
 use crate::snapshot_slot::SnapshotSlot;
 use crate::{SAMPLING, SERVICES};
 
-/// What the task owns.
+/// The data that the task owns.
 pub(crate) struct Process {
     frames: Frames,
     alarm: Alarm,
     lamps: Lamps,
-    /// When the last snapshot came, or one was last asked for.
+    /// Time of the last snapshot, or of the last request for one.
     sampled: Instant,
     lost: &'static Losses,
 }
 
-/// Snapshots come every millisecond. After so long without one the sampling task has to see what is wrong.
+/// Time without a snapshot, which should come every millisecond, after which the sampling task is woken to check.
 const OVERDUE: Duration = Duration::from_millis(2);
 
 impl Process {
@@ -28,8 +28,8 @@ impl Process {
         Process { frames, alarm, lamps, sampled: Clock::now(), lost }
     }
 
-    /// Hands on the alarm of the services, which this task's interrupt brings. It comes by every millisecond, so an alarm whose
-    /// interrupt was lost is not much later.
+    /// Passes on the alarm of the services, which arrives with this task's interrupt. The task runs every millisecond,
+    /// so an alarm whose interrupt was lost is not much later.
     pub(crate) fn wake_services(&mut self, ring: Ring) {
         if ring == Ring::Missed {
             self.lost.count(Event::Alarm);
@@ -39,7 +39,7 @@ impl Process {
         }
     }
 
-    /// Does everything that is due and sets the alarm for what comes next.
+    /// Does everything that is due, and sets the alarm for the next deadline.
     pub(crate) fn run(&mut self, snapshot: &mut impl Mutex<T = SnapshotSlot>, node: &mut impl Shared) {
         while let Some(Received { frame, at }) = self.frames.dequeue() {
             let next = node.call(|protocol, out| protocol.on_process_frame(&frame, at, out));
@@ -56,7 +56,7 @@ impl Process {
         self.lamps.set(outputs.digital);
     }
 
-    /// Sets the alarm, and wakes the services where they are due: NMT may have asked for something.
+    /// Sets the alarm, and wakes the services if they are due, for example after an NMT command.
     fn follow(&mut self, next: Next, now: Instant) {
         self.alarm.set(next.process.min(self.sampled + OVERDUE));
         if next.services <= now {

@@ -1,4 +1,5 @@
-//! Services: frames of FIFO 1, heartbeat, SDO and EMCY, errors of the bus, and what the protocol asks of the firmware.
+//! Services: frames of FIFO 1, heartbeat, SDO and EMCY, errors of the bus, and actions that the protocol leaves to the
+//! firmware.
 
 use bsp::back_off::BackOff;
 use bsp::bus_state::{BusState, BusWatch};
@@ -18,20 +19,20 @@ use crate::bus::event_of;
 use crate::shared::Shared;
 use crate::{PROCESS, STORAGE};
 
-/// The task runs at least this often: the watchdog wants a sign of life, and a recovery of the bus raises no interrupt.
+/// The task runs at least this often: the watchdog needs a sign of life, and a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// So long after its start the application is well, if it is on the bus and measures: crashes before that add up, and the bootloader
-/// stays after three.
+/// Time after its start at which the application is confirmed, if it is on the bus and measures. Earlier crashes add
+/// up, and after three the bootloader stays.
 const CONFIRMATION: Instant = Instant(10_000_000);
 
-/// What the task owns.
+/// The data that the task owns.
 pub(crate) struct Services {
     can: Controller,
     rate: Rate,
     frames: Frames,
     lost: &'static Losses,
-    /// What of `lost` has been reported.
+    /// The counts of `lost` that have been reported.
     told: [u32; EVENTS],
     alarm: Alarm,
     led: Led,
@@ -39,20 +40,20 @@ pub(crate) struct Services {
     back_off: BackOff,
     /// Whether the node has been on the bus since its start.
     has_joined: bool,
-    /// New ones, for the sampling task.
+    /// New parameters for the sampling task.
     parameters: Option<Parameters>,
-    /// What the start-up has found, until the bus has been told.
+    /// Faults found at start-up, until they have been reported.
     start_up_faults: StartUpFaults,
 }
 
-/// Faults that are known before there is a bus to tell.
+/// Faults that are found before the bus can be used.
 #[derive(Clone, Copy)]
 pub(crate) struct StartUpFaults {
     /// The last run ended in a crash.
     pub(crate) crashed: bool,
     /// Nothing can be stored.
     pub(crate) no_store: bool,
-    /// What is wrong with the device record.
+    /// The fault of the device record, if there is one.
     pub(crate) boot_data: Option<&'static Fault>,
 }
 
@@ -65,7 +66,7 @@ impl StartUpFaults {
 }
 
 impl Services {
-    /// Not on the bus yet: the first run goes there.
+    /// Not on the bus yet: the first run joins the bus.
     pub(crate) fn new(
         can: Controller,
         rate: Rate,
@@ -91,7 +92,7 @@ impl Services {
         }
     }
 
-    /// Does everything that is due and sets the alarm for what comes next.
+    /// Does everything that is due, and sets the alarm for the next deadline.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
         if !core::mem::replace(&mut self.has_joined, true) {
             let next = self.join(node);
@@ -117,21 +118,21 @@ impl Services {
         }
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
-        // It tells the watchdog that it is there, whether there is something to store or not.
+        // The storage task must report to the watchdog, whether there is something to store or not.
         rtic::pend(STORAGE);
     }
 
-    /// Whether it is on the bus and measures.
+    /// Whether the node is on the bus and measures.
     fn is_well(&mut self, node: &mut impl Shared) -> bool {
         self.can.state() != BusState::Off && node.call(|protocol, _| protocol.is_at_work())
     }
 
-    /// The parameters that have changed, once.
+    /// The changed parameters; a second call returns `None`.
     pub(crate) fn take_parameters(&mut self) -> Option<Parameters> {
         self.parameters.take()
     }
 
-    /// One call into the protocol.
+    /// Makes one call of the protocol.
     fn call(
         &mut self,
         node: &mut impl Shared,
@@ -148,7 +149,7 @@ impl Services {
         next
     }
 
-    /// Does what a call has left to the firmware, until nothing is left.
+    /// Carries out the actions that a call has left to the firmware, until none is left.
     fn settle(&mut self, mut next: Next, node: &mut impl Shared) -> Next {
         while let Some(action) = next.action {
             next = self.fulfil(action, node);
@@ -156,7 +157,7 @@ impl Services {
         next
     }
 
-    /// Listens for the bit rate; goes on the bus when it is found.
+    /// Continues the detection of the bit rate, and goes on the bus when it is found.
     fn search(&mut self, node: &mut impl Shared) {
         if self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) {
             let next = self.join(node);
@@ -187,7 +188,7 @@ impl Services {
         }
     }
 
-    /// Counts of the hardware to where they can be seen. A lost frame has an emergency of its own.
+    /// Shows and logs the counts of lost hardware events. A lost frame also causes an EMCY.
     fn report_losses(&mut self, node: &mut impl Shared) {
         let all = self.lost.all();
         let told = core::mem::replace(&mut self.told, all);
@@ -204,12 +205,12 @@ impl Services {
         }
     }
 
-    /// What follows is found by the poll at the end of the run.
+    /// The resulting actions are found by the poll at the end of the run.
     fn report(&mut self, event: BusEvent, now: Instant, node: &mut impl Shared) {
         let _ = self.call(node, |protocol, _| protocol.bus_event(event, now));
     }
 
-    /// Does one thing that the protocol leaves to the firmware.
+    /// Carries out one action that the protocol leaves to the firmware.
     fn fulfil(&mut self, action: Action, node: &mut impl Shared) -> Next {
         match action {
             Action::ResetNode => restart(),
@@ -228,21 +229,21 @@ impl Services {
         self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out))
     }
 
-    /// Starts the communication on a bus whose bit rate is known; looks for it first where it is not.
+    /// Starts the communication if the bit rate is known, otherwise the detection of the bit rate.
     fn join(&mut self, node: &mut impl Shared) -> Next {
         if !self.go_on_bus(node) {
             return self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out));
         }
         let faults = self.start_up_faults;
-        // In one call: a node with an error must not have started by itself before it knows the error.
+        // In one call: a node with an error must not start by itself before it knows the error.
         let next = self.call(node, |protocol, out| {
             let now = Clock::now();
             let next = protocol.start(now, out);
-            // The messages go out with the next poll.
+            // The EMCYs are sent with the next poll.
             for fault in faults.all() {
                 let _ = protocol.set_fault(fault, true, now);
             }
-            // It is told, and over: the program that runs is well.
+            // The fault is reported and cleared at once, because the running program is fine.
             if protocol.is_taken_back() {
                 for is_active in [true, false] {
                     let _ = protocol.set_fault(&PROGRAM_TAKEN_BACK, is_active, now);
@@ -255,8 +256,8 @@ impl Services {
         next
     }
 
-    /// Goes on the bus, deaf at first: which identifiers are of interest is known after the start of the protocol. False
-    /// when the bit rate has to be found first.
+    /// Goes on the bus, without filters at first, because the identifiers are known only after the start of the
+    /// protocol. False if the bit rate has to be detected first.
     fn go_on_bus(&mut self, node: &mut impl Shared) -> bool {
         node.call(|_, queue| queue.clear());
         let Rate::Known(timing) = self.rate else {
@@ -270,7 +271,7 @@ impl Services {
         true
     }
 
-    /// Leaves word for the bootloader where the node is on the bus.
+    /// Leaves a note for the bootloader about node-ID and bit rate.
     fn hand_over(&self, node: &mut impl Shared, stay: bool) {
         let Rate::Known(timing) = self.rate else { return };
         let node_id = node.call(|protocol, _| protocol.node_id());
@@ -284,7 +285,7 @@ impl Services {
     }
 }
 
-/// NMT reset node, or the bootloader is asked for: everything begins anew, the bootloader included.
+/// Restarts everything, including the bootloader, on NMT reset node or a request for the bootloader.
 fn restart() -> ! {
     defmt::info!("restart");
     cortex_m::peripheral::SCB::sys_reset()

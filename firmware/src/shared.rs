@@ -1,4 +1,4 @@
-//! The protocol and the transmit queue, which process data and services share.
+//! The protocol and the transmit queue, shared by process data and services.
 
 use bsp::transmit_queue::TransmitQueue;
 use node::Protocol;
@@ -6,7 +6,7 @@ use rtic::mutex_prelude::*;
 
 use crate::TRANSMIT;
 
-/// The one way into the protocol: for the time of one call, and with a look at the transmit queue after it.
+/// The only access to the protocol: for one call, followed by a check of the transmit queue.
 pub(crate) trait Shared {
     /// Calls into the protocol, then wakes the transmit task when frames wait.
     fn call<R>(&mut self, f: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> R) -> R;

@@ -1,8 +1,9 @@
-//! The slot snapshot, on its way from the sampling task to that of the process data.
+//! The slot for the snapshot, from the sampling task to the process data task.
 
 use node::Snapshot;
 
-/// Written in its place and copied once: a thousand times a second, a copy of some hundred bytes counts.
+/// The snapshot is written in its place and copied once: a thousand times a second, each copy of some hundred bytes
+/// matters.
 #[derive(Default)]
 pub struct SnapshotSlot {
     snapshot: Snapshot,
@@ -10,13 +11,13 @@ pub struct SnapshotSlot {
 }
 
 impl SnapshotSlot {
-    /// The place of the next one.
+    /// The place for the next snapshot.
     pub(crate) fn renew(&mut self) -> &mut Snapshot {
         self.is_new = true;
         &mut self.snapshot
     }
 
-    /// Copies the one that nobody has taken yet; false when there is none.
+    /// Copies a snapshot that has not been taken yet; false if there is none.
     pub(crate) fn take(&mut self, to: &mut Snapshot) -> bool {
         if self.is_new {
             *to = self.snapshot;

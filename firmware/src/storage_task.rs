@@ -1,11 +1,11 @@
-//! The task of the parameter store: at the lowest priority it does what the protocol wants stored. The flash stops the
-//! core for 16 us with every word, so everything else runs between two words.
+//! The task of the parameter store, at the lowest priority: it carries out the store jobs of the protocol. The flash
+//! stops the core for 16 us with every word, so all other tasks run between two words.
 
 use bsp::Clock;
 use bsp::ParameterFlash;
 use bsp::update_layout::LAYOUT;
 use canopen::sdo::Abort;
-use node::{LastingRecord, StoreJob, Verdict};
+use node::{StoreJob, StoredPositionRecord, Verdict};
 use profiles::board::RETAINED_WORDS;
 use storage::Store;
 use update::Trial;
@@ -13,36 +13,36 @@ use update::Trial;
 use crate::SERVICES;
 use crate::shared::Shared;
 
-/// What the task owns.
+/// The data that the task owns.
 pub(crate) struct StorageTask {
-    /// `None` when the flash could not be prepared: then nothing can be stored.
+    /// `None` if the flash could not be prepared, so that nothing can be stored.
     store: Option<Store<ParameterFlash>>,
     job: &'static mut StoreJob,
-    lasting: LastingRecord,
+    position_record: StoredPositionRecord,
 }
 
-/// What a profile retains, as the last sample has left it; `None` where it retains nothing.
+/// The words retained by the last sample; `None` if the profile retains nothing.
 pub(crate) type Retained = Option<[u32; RETAINED_WORDS]>;
 
 impl StorageTask {
     pub(crate) fn new(
         store: Option<Store<ParameterFlash>>,
         job: &'static mut StoreJob,
-        lasting: LastingRecord,
+        position_record: StoredPositionRecord,
     ) -> StorageTask {
-        StorageTask { store, job, lasting }
+        StorageTask { store, job, position_record }
     }
 
-    /// Whether it can store anything.
+    /// Whether the store works.
     pub(crate) fn is_working(&self) -> bool {
         self.store.is_some()
     }
 
-    /// Keeps what a start without a battery has to know of the positions.
+    /// Stores the record about the retained state, which a start with an empty battery needs.
     pub(crate) fn keep(&mut self, retained: &Retained, node: &mut impl Shared) {
         if let (Some(store), Some(words)) = (&mut self.store, retained) {
             let device = node.call(|protocol, _| protocol.device_record());
-            match self.lasting.keep(words, &device, store) {
+            match self.position_record.keep(words, &device, store) {
                 Ok(true) => defmt::info!("the record of the positions is stored"),
                 Ok(false) => {}
                 Err(_) => defmt::error!("the record of the positions is not stored"),
@@ -50,7 +50,7 @@ impl StorageTask {
         }
     }
 
-    /// Does what the protocol has found about the trial of this program.
+    /// Carries out the verdict on the trial of this program.
     pub(crate) fn judge(&mut self, node: &mut impl Shared) {
         let Some(verdict) = node.call(|protocol, _| protocol.verdict()) else { return };
         let Some(store) = &mut self.store else { return };
@@ -60,7 +60,7 @@ impl StorageTask {
             Verdict::TakeBack => Trial::withdraw(&mut records, &LAYOUT).is_ok(),
         };
         match verdict {
-            // The next turn tries again.
+            // The next run tries again.
             _ if !is_done => defmt::error!("the trial of this program cannot be ended"),
             Verdict::Confirm => {
                 defmt::info!("this program is confirmed");
@@ -73,7 +73,8 @@ impl StorageTask {
         }
     }
 
-    /// Does the job that waits, if one does. A program on trial stores nothing: the one before it has to find its settings.
+    /// Carries out the waiting job, if there is one. A program on trial stores nothing, because the previous program
+    /// has to find its settings.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
         let job = &mut *self.job;
         if !node.call(|protocol, _| protocol.take_job(job)) {
@@ -89,7 +90,7 @@ impl StorageTask {
             Ok(()) => defmt::info!("stored"),
             Err(abort) => defmt::error!("not stored: {=u32:#010x}", abort.code()),
         }
-        // What follows is left to the services, which find it when they poll.
+        // The resulting actions are left to the services task, which finds them at its next poll.
         let _ = node.call(|protocol, out| protocol.finish(job, result, Clock::now(), out));
         rtic::pend(SERVICES);
     }

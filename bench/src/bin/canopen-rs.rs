@@ -1,6 +1,6 @@
-//! canopen-rs, called as its documentation says: a frame goes to the node, the answer comes back, SYNC and the writes that
-//! change a PDO are the application's to notice. The library takes no time: heartbeat, inhibit time and event timer are left to
-//! the application.
+//! canopen-rs, called as in its documentation: a frame is given to the node, and the node returns the answer. SYNC, and
+//! writes that change a PDO, must be detected by the application. The library has no time: heartbeat, inhibit time and
+//! event timer are left to the application.
 #![no_std]
 #![no_main]
 
@@ -14,17 +14,17 @@ use canopen_rs::pdo::MappingEntry;
 use canopen_rs::{Address, ByteString, Entry, NodeId, ObjectDictionary, StandardObjects, Value};
 use cortex_m_rt::entry;
 
-/// The node-ID that the host talks to.
+/// Node-ID for the host's requests.
 const ID: u8 = 1;
 const SYNC: u16 = 0x80;
-/// The number of entries that `dictionary` makes: the library finds an entry by looking at all before it.
+/// Number of entries that `dictionary` makes: the library finds an entry by a linear search.
 const ENTRIES: usize = 139;
-/// Two numbers of 32 bits.
+/// Number of mapped objects: two numbers of 32 bits.
 const MAPPED: u8 = 2;
 
 struct CanopenRs(node::Node<ENTRIES>);
 
-/// A received frame: the library takes its parts.
+/// A received frame, from which the library takes its parts.
 struct Received(Bits);
 
 impl From<Bits> for Received {
@@ -39,7 +39,7 @@ impl Received {
     }
 }
 
-/// The node as zencan.toml and bin/ours/dictionary.rs describe it.
+/// The node described by zencan.toml and bin/ours/dictionary.rs.
 struct Dictionary(ObjectDictionary<ENTRIES>);
 
 impl Dictionary {
@@ -47,7 +47,7 @@ impl Dictionary {
         self.0.insert(Address::new(index, sub), entry).expect("there is room for every entry");
     }
 
-    /// Communication and mapping parameters of a PDO that carries two of the numbers at `index`.
+    /// Communication and mapping parameters of a PDO with two of the numbers at `index`.
     fn pdo(&mut self, number: u16, base: u16, cob_id: u32, transmission: u8, index: u16) {
         let (parameters, mapping) = (base + number, base + 0x200 + number);
         self.insert(parameters, 0, Entry::constant(Value::Unsigned8(2)));
@@ -61,7 +61,7 @@ impl Dictionary {
         }
     }
 
-    /// Eight numbers.
+    /// Eight numbers in an object.
     fn numbers(&mut self, index: u16, entry: fn(Value) -> Entry) {
         self.insert(index, 0, Entry::constant(Value::Unsigned8(8)));
         (1..=8).for_each(|sub| self.insert(index, sub, entry(Value::Integer32(sub.into()))));

@@ -1,14 +1,14 @@
-//! Nothing: what is subtracted from the sizes of the others.
+//! The empty program, whose size is subtracted from the sizes of the others.
 #![no_std]
 #![no_main]
 
 use bench_images::{Bits, Domain, Node, transmit};
 use cortex_m_rt::entry;
 
-/// Does nothing but what every program has around its node: a driver, and the content of a domain.
+/// Only the parts that every program has around its node: a driver, and the content of a domain.
 struct Empty(Domain);
 
-/// A frame as it is in the registers.
+/// A frame in the form of the registers.
 struct Raw(Bits);
 
 impl From<Bits> for Raw {

@@ -1,5 +1,5 @@
-//! zencan-node, called as its documentation says: frames go into the mailbox at once, `process` runs when the mailbox
-//! asks for it, and the driver fetches frames when it is told that there are some.
+//! zencan-node, called as in its documentation: frames go into the mailbox at once, `process` runs when the mailbox
+//! requests it, and the driver fetches frames when it is notified.
 #![no_std]
 #![no_main]
 
@@ -8,7 +8,7 @@ use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use bench_images::{Bits, Domain, Node, transmit};
-// The critical sections that the mailbox and every object need.
+// The critical sections needed by the mailbox and every object.
 use cortex_m as _;
 use cortex_m_rt::entry;
 use critical_section::Mutex;
@@ -22,16 +22,16 @@ mod generated {
     zencan_node::include_modules!(NODE);
 }
 
-/// The node-ID that the host talks to.
+/// Node-ID for the host's requests.
 const ID: u8 = 1;
 
-/// The mailbox wants `process` to run.
+/// The mailbox requests a run of `process`.
 static PROCESS: AtomicBool = AtomicBool::new(false);
-/// There are frames to fetch.
+/// Frames are ready to be fetched.
 static TRANSMIT: AtomicBool = AtomicBool::new(false);
 static CONTENT: Content = Content(Mutex::new(RefCell::new(Domain::new())));
 
-/// The domain as zencan reaches it.
+/// The domain in the form that zencan accesses.
 struct Content(Mutex<RefCell<Domain>>);
 
 impl SubObjectAccess for Content {
@@ -57,7 +57,7 @@ impl SubObjectAccess for Content {
 
 struct Zencan(zencan_node::Node<'static>);
 
-/// A message of zencan's.
+/// A message in zencan's type.
 struct Message(CanMessage);
 
 impl From<Bits> for Message {
@@ -107,7 +107,8 @@ impl Node for Zencan {
         let _ = generated::NODE_MBOX.store_message(message);
     }
 
-    /// The mailbox does not ask for an RPDO to be processed: it waits for the next pass, which is counted with it.
+    /// The mailbox does not request processing for an RPDO: the RPDO waits for the next pass, which is therefore
+    /// counted too.
     fn process(&mut self, Message(message): Message, now: u64) {
         let _ = generated::NODE_MBOX.store_message(message);
         self.run(now);
@@ -121,7 +122,7 @@ impl Node for Zencan {
         }
     }
 
-    /// It reports no faults.
+    /// The node reports no faults.
     fn disturb(&mut self, _: u64) {
         let _ = generated::OBJECT2000.set(0, 0);
         let _ = generated::OBJECT2000.set_event_flag(1);

@@ -1,25 +1,26 @@
-//! When a node that went off the bus comes back.
+//! The time after which a node in bus-off returns to the bus.
 //!
-//! CAN lets a node return after 128 times 11 recessive bits, 1.4 ms at 1 Mbit/s. A node whose line is shorted would then
-//! disturb the others hundreds of times a second. So it waits: 50 ms at first, twice as long each time it fails again,
-//! at most 3.2 s. After 10 s without a bus-off it begins anew.
+//! CAN lets a node return after 128 times 11 recessive bits, 1.4 ms at 1 Mbit/s. A node whose line is shorted would
+//! then disturb the others hundreds of times a second. The node therefore waits 50 ms at first, and twice as long each
+//! time it fails again, up to 3.2 s. After 10 s without a bus-off the waiting time starts again at 50 ms.
 
 use canopen::{Duration, Instant};
 
 const FIRST: Duration = Duration::from_millis(50);
 const LONGEST: Duration = Duration::from_millis(3_200);
-/// After so long on the bus without a bus-off the waiting times begin anew.
+/// Time on the bus without a bus-off after which the waiting time starts again at `FIRST`.
 const GOOD: Duration = Duration::from_millis(10_000);
-/// The recovery of the controller takes 141 ms at 10 kbit/s. A node that is still off the bus after this time has failed again.
+/// Time for the recovery of the controller, which takes 141 ms at 10 kbit/s. A node that is still off the bus
+/// afterwards has failed again.
 const WAY_BACK: Duration = Duration::from_millis(200);
 
 /// The waiting times of a node.
 #[derive(Debug)]
 pub struct BackOff {
     next: Duration,
-    /// When to return, while off the bus.
+    /// Time to return, while off the bus.
     due: Option<Instant>,
-    /// When it last began to return.
+    /// Time of the last return.
     returned: Option<Instant>,
 }
 
@@ -30,7 +31,7 @@ impl Default for BackOff {
 }
 
 impl BackOff {
-    /// The node is off the bus. To be called again and again as long as that is so.
+    /// The node is off the bus. To be called repeatedly while the node is off the bus.
     pub fn bus_off(&mut self, now: Instant) {
         let is_returning = self.returned.is_some_and(|returned| now < returned + WAY_BACK);
         if self.due.is_some() || is_returning {
@@ -52,7 +53,7 @@ impl BackOff {
         is_over
     }
 
-    /// When to ask [`is_over`](BackOff::is_over) again.
+    /// Time at which to ask [`is_over`](BackOff::is_over) again.
     #[must_use]
     pub fn due(&self) -> Instant {
         self.due.unwrap_or(Instant::NEVER)
@@ -63,7 +64,7 @@ impl BackOff {
 mod tests {
     use super::*;
 
-    /// Waits until it may return, and fails on the way back; how long the wait was in ms.
+    /// Waits for the return, then fails again. Returns the waiting time in ms.
     fn wait(back_off: &mut BackOff, now: &mut Instant) -> u64 {
         back_off.bus_off(*now);
         let due = back_off.due();

@@ -1,14 +1,14 @@
-//! Finding the bit rate of a bus by listening to it, silently: no frame, no acknowledge, no error frame.
+//! Detection of the bit rate of a bus by silent listening: without frames, acknowledges and error frames.
 //!
-//! One rate after the other is listened to until a frame is understood. An error ends the try at once, silence after a
-//! while. That while doubles from round to round up to 1.28 s, so that a bus with a frame in every such span, as one
-//! heartbeat a second, is always understood, and a busy one within some hundredths of a second.
+//! The rates are tried in turn until a frame is received. A try ends at once with an error, and after some time with
+//! silence. That time doubles from round to round up to 1.28 s. A bus with a frame in every such interval, for example
+//! one heartbeat a second, is therefore always detected, and a busy bus within some hundredths of a second.
 
 use canopen::{Duration, Instant};
 
 use crate::bit_timing::BitTiming;
 
-/// In the order of their use in the field.
+/// The rates, the most common in the field first.
 static RATES: [BitTiming; 8] = [
     BitTiming::at(250),
     BitTiming::at(500),
@@ -19,18 +19,18 @@ static RATES: [BitTiming; 8] = [
     BitTiming::at(800),
     BitTiming::at(10),
 ];
-/// Longer than the longest frame at 10 kbit/s (14 ms) and the look that comes every 20 ms.
+/// Longer than the longest frame at 10 kbit/s (14 ms) and than the polling interval of 20 ms.
 const FIRST: Duration = Duration::from_millis(40);
 const LONGEST: Duration = Duration::from_millis(1_280);
 
-/// Frames and errors that the controller has seen since the last look.
+/// Events that the controller has seen since the last poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// Nothing at all.
+    /// Neither frame nor error.
     Silence,
     /// A frame without an error.
     Frame,
-    /// A frame of our own that nobody has acknowledged.
+    /// An own frame without an acknowledge.
     Nobody,
     /// Any other error.
     Error,
@@ -39,15 +39,15 @@ pub enum Heard {
 /// The next step of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Go on listening.
+    /// Continue listening.
     Stay,
     /// Listen at this rate.
     Listen(BitTiming),
-    /// This is the rate.
+    /// The bit rate is this one.
     Found(BitTiming),
 }
 
-/// A search.
+/// A search for the bit rate.
 #[derive(Debug)]
 pub struct Detector {
     rate: usize,
@@ -56,19 +56,19 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// Begins; the first rate to listen to is [`Detector::timing`].
+    /// Begins a search; the first rate to listen at is [`Detector::timing`].
     #[must_use]
     pub fn new(now: Instant) -> Detector {
         Detector { rate: 0, patience: FIRST, until: now + FIRST }
     }
 
-    /// The rate that is listened to.
+    /// The rate of the present try.
     #[must_use]
     pub fn timing(&self) -> BitTiming {
         RATES.get(self.rate).copied().unwrap_or(BitTiming::FASTEST)
     }
 
-    /// Takes what was heard at the present rate.
+    /// Takes the events at the present rate.
     pub fn step(&mut self, heard: Heard, now: Instant) -> Step {
         match heard {
             Heard::Frame => Step::Found(self.timing()),
@@ -109,14 +109,14 @@ mod tests {
         assert_eq!(detector.step(Heard::Frame, Instant(40_002)), Step::Found(BitTiming::of(125).unwrap()));
     }
 
-    /// A heartbeat a second and nothing else, at each of the rates, beginning at any time.
+    /// One heartbeat a second and nothing else, at each of the rates, starting at any time.
     #[test]
     fn a_bus_with_a_frame_a_second_is_understood() {
         for rate in RATES.map(BitTiming::kbit) {
             for offset in (0..1_000_000).step_by(70_000) {
                 let mut detector = Detector::new(Instant(0));
                 let found = (0..2_000).map(|i| Instant(i * 20_000)).find(|&now| {
-                    // The worst: what is sent faster or slower is not even seen.
+                    // The worst case: frames at another rate cause not even an error.
                     let is_understood = detector.timing().kbit() == rate;
                     let is_heard = is_understood && (now.0 + offset) % 1_000_000 < 20_000;
                     let heard = if is_heard { Heard::Frame } else { Heard::Silence };

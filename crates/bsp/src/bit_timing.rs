@@ -1,6 +1,6 @@
-//! Bit timing of bxCAN (RM0390, 30.7.7): every bit rate of CiA 301 exactly, 800 kbit/s included.
+//! Bit timing of bxCAN (RM0390, 30.7.7): exact for every bit rate of CiA 301, including 800 kbit/s.
 //!
-//! At 42 or 45 MHz, the usual clocks of APB1, 800 kbit/s cannot be met exactly. At 36 MHz all of them can.
+//! 800 kbit/s is not exact with APB1 at 42 or 45 MHz, the usual clocks. With 36 MHz all rates are exact.
 
 /// Clock of APB1, hence of bxCAN, in hertz.
 pub const APB1_HZ: u32 = 36_000_000;
@@ -14,9 +14,9 @@ pub struct BitTiming {
     segment2: u8,
 }
 
-/// Prescaler and segments with the sample point near the 87.5 % that CiA 301 asks for. The second segment has two quanta: with one, as
-/// eight quanta a bit would have it, the answer of a receiver whose clock is a quantum ahead falls on the sample point of the
-/// transmitter as soon as the oscillators are 0.1 % apart (`host-tests/tests/node/bit_timing.rs`).
+/// Prescalers and segments with the sample point near the 87.5 % of CiA 301. The second segment has two quanta. With
+/// one quantum, as with eight quanta per bit, the answer of a receiver whose clock is a quantum ahead falls on the
+/// sample point of the transmitter as soon as the oscillators differ by 0.1 % (`host-tests/tests/node/bit_timing.rs`).
 static TABLE: [BitTiming; 8] = [
     BitTiming { kbit: 1000, prescaler: 2, segment1: 15, segment2: 2 },
     BitTiming { kbit: 800, prescaler: 3, segment1: 12, segment2: 2 },
@@ -41,7 +41,7 @@ impl BitTiming {
     /// Bit timing of 1 Mbit/s.
     pub const FASTEST: BitTiming = BitTiming::at(1000);
 
-    /// The timing for a bit rate in kbit/s; `None` when it is none of CiA 301.
+    /// The timing for a bit rate in kbit/s; `None` if CiA 301 does not have the rate.
     #[must_use]
     #[inline(never)]
     pub const fn of(kbit: u16) -> Option<BitTiming> {
@@ -55,7 +55,7 @@ impl BitTiming {
         None
     }
 
-    /// The same for a bit rate that is known to the compiler, which refuses any other.
+    /// The timing for a constant bit rate; any rate that CiA 301 does not have is a compile error.
     pub(crate) const fn at(kbit: u16) -> BitTiming {
         match BitTiming::of(kbit) {
             Some(timing) => timing,
@@ -95,7 +95,7 @@ impl BitTiming {
 mod tests {
     use super::*;
 
-    /// CiA 301 asks for 87.5 %, between 85 % and 90 % up to 500 kbit/s and 75 % and 90 % above.
+    /// CiA 301 recommends 87.5 %; it allows 85 % to 90 % up to 500 kbit/s, and 75 % to 90 % above.
     #[test]
     fn the_sample_point_is_where_cia_301_wants_it() {
         for timing in TABLE {

@@ -6,16 +6,16 @@ pub enum BusState {
     /// Both counters below 96.
     #[default]
     Active,
-    /// One of them at 96 or more.
+    /// At least one counter is at 96 or more.
     Warning,
-    /// One of them above 127.
+    /// At least one counter is above 127.
     Passive,
-    /// The transmit error counter above 255: the node is off the bus.
+    /// The transmit error counter is above 255: the node is off the bus.
     Off,
 }
 
 impl BusState {
-    /// The state that a value of `CAN_ESR` means.
+    /// The state in a value of `CAN_ESR`.
     #[must_use]
     pub fn from_esr(esr: u32) -> BusState {
         match esr & 0b111 {
@@ -27,15 +27,15 @@ impl BusState {
     }
 }
 
-/// Notices changes of the state. An interrupt tells when the state gets worse, none when the state gets better: the state has to be
-/// looked at from time to time as well.
+/// Detects changes of the state. An interrupt signals that the state gets worse, but none that it gets better, so the
+/// state must also be polled.
 #[derive(Debug, Default)]
 pub struct BusWatch {
     last: BusState,
 }
 
 impl BusWatch {
-    /// The states before and now, when they differ.
+    /// The states before and now, if they differ.
     pub fn change(&mut self, now: BusState) -> Option<(BusState, BusState)> {
         let before = core::mem::replace(&mut self.last, now);
         (before != now).then_some((before, now))

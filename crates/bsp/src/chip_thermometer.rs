@@ -1,10 +1,10 @@
-//! The characteristic of the temperature sensor in the chip, from what its maker has measured.
+//! The characteristic of the temperature sensor in the chip, from the manufacturer's measurements.
 
-/// Temperatures at which the maker of the chip took the two points, in K (STM32F446 datasheet, 6.3.22).
+/// Temperatures of the manufacturer's two measurements in K (STM32F446 datasheet, 6.3.22).
 const LOW: f32 = 303.15;
 const HIGH: f32 = 383.15;
 
-/// Conversions that the maker of the chip took at 3.3 V and left in system memory.
+/// Conversions that the manufacturer made at 3.3 V and stored in system memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Calibration {
     /// Temperature sensor at 30 degC (`TS_CAL1`).
@@ -16,8 +16,8 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// `offset` and `slope` in K of `T = offset + slope * sensor / reference`, where both are read against one supply
-    /// (RM0390, 13.10). No numbers when the two points are one.
+    /// `offset` and `slope` in K of `T = offset + slope * sensor / reference`, with both converted against the same
+    /// supply (RM0390, 13.10). Not finite if the two points are equal.
     #[must_use]
     pub fn line(&self) -> (f32, f32) {
         let low = f32::from(self.temperature_30);

@@ -1,5 +1,5 @@
-//! The crash record: a few words in RAM that no start-up code touches. A crash leaves the record for the next start; a CRC tells
-//! the record from what RAM holds by chance.
+//! The crash record: a few words in RAM that no start-up code changes. A crash leaves the record for the next start; a
+//! CRC distinguishes the record from random content of RAM.
 
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
@@ -8,13 +8,13 @@ const CLOCK: u32 = 3;
 const INTERRUPT: u32 = 4;
 const FILE_WORDS: usize = 8;
 
-/// Words for the details of a crash. The place of a panic, a line and the name of a file, needs the most.
+/// Words for the details of a crash. The location of a panic (a line and the name of a file) needs the most.
 type Content = [u32; 1 + FILE_WORDS];
 
 /// Words of a record in RAM: a mark, the kind of crash, its details, and the CRC.
 pub const WORDS: usize = 3 + size_of::<Content>() / 4;
 
-/// The record as it lies in RAM.
+/// The words of the record in RAM.
 pub type Sealed = [u32; WORDS];
 
 /// A crash.
@@ -22,22 +22,22 @@ pub type Sealed = [u32; WORDS];
 pub enum Crash {
     /// The core took a fault.
     Fault(Fault),
-    /// The program gave up.
+    /// A panic of the program.
     Panic(Place),
     /// The clock on `OSC_IN` failed.
     Clock,
-    /// An interrupt came that nobody serves: its number in the NVIC, or, below 0, that of an exception of the core less 16
+    /// An interrupt without a handler: its number in the NVIC or, below 0, the number of a core exception minus 16
     /// (PM0214, 2.3.2: IRQ number).
     Interrupt(i16),
 }
 
-/// Registers at a fault (PM0214, 4.4). Program counter and link register are 0 when the stack could not be read, as
-/// after an overflow.
+/// Registers at a fault (PM0214, 4.4). Program counter and link register are 0 if the stack could not be read, for
+/// example after an overflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// Where it happened.
+    /// Program counter of the fault.
     pub pc: u32,
-    /// The link register: where the function was called from.
+    /// Link register: the caller of the function.
     pub lr: u32,
     /// The stack pointer on entry.
     pub sp: u32,
@@ -45,11 +45,11 @@ pub struct Fault {
     pub cfsr: u32,
     /// Hard fault status.
     pub hfsr: u32,
-    /// The address of the access, when CFSR says that it is valid.
+    /// Address of the access, if CFSR says that it is valid.
     pub address: u32,
 }
 
-/// Where a panic was raised.
+/// Location of a panic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     line: u32,
@@ -57,7 +57,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// A line of a source file, of whose name the end is kept.
+    /// A line of a source file. Only the end of a long file name is kept.
     #[must_use]
     pub fn new(file: &str, line: u32) -> Place {
         let mut kept = [0; FILE_WORDS * 4];
@@ -65,13 +65,13 @@ impl Place {
         Place { line, file: kept }
     }
 
-    /// The line.
+    /// The line number.
     #[must_use]
     pub fn line(&self) -> u32 {
         self.line
     }
 
-    /// The end of the file's name; empty when it was cut inside of a character.
+    /// The end of the file name; empty if the cut was inside a character.
     #[must_use]
     pub fn file(&self) -> &str {
         let name = self.file.iter().position(|&byte| byte != 0).and_then(|start| self.file.get(start..));
@@ -80,7 +80,8 @@ impl Place {
 }
 
 impl Crash {
-    /// The record to leave in RAM. Inlined, as each of the few that call knows which crash it is: the rest is left out.
+    /// The record to leave in RAM. Inlined, because each of the few callers has a known kind of crash, and the compiler
+    /// removes the others.
     #[allow(clippy::inline_always)]
     #[inline(always)]
     #[must_use]
@@ -93,7 +94,7 @@ impl Crash {
         }
     }
 
-    /// The crash in `words`; `None` when the mark or the CRC is wrong, as after power-on.
+    /// The crash in `words`; `None` if the mark or the CRC is wrong, for example after power-on.
     #[must_use]
     pub fn open(words: &Sealed) -> Option<Crash> {
         let [MAGIC, kind, content @ .., sum] = words else { return None };
@@ -143,7 +144,7 @@ fn interrupt([number, ..]: &Content) -> i16 {
     i16::from_le_bytes([low, high])
 }
 
-/// The CRC of all words but the last.
+/// The CRC of all words except the last.
 fn check(words: &Sealed) -> u32 {
     let mut digest = checksum::begin();
     words.iter().take(WORDS - 1).for_each(|word| digest.update(&word.to_le_bytes()));

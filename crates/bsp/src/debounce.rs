@@ -1,19 +1,19 @@
-//! Contacts that bounce.
+//! Debouncing of contacts.
 
-/// How many samples in a row must agree before the input counts as changed. At 1 kHz these are 10 ms: contacts bounce for less than
-/// that, and nobody presses a button for less.
+/// Number of consecutive samples that must agree before the input changes. At 1 kHz this is 10 ms: contacts bounce for
+/// less, and nobody presses a button for less.
 const SAMPLES: u8 = 10;
 
-/// One input, sampled at an even pace.
+/// One input, sampled at a constant rate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Debounce {
     is_on: bool,
-    /// Samples in a row that say the opposite.
+    /// Number of consecutive samples with the opposite state.
     other: u8,
 }
 
 impl Debounce {
-    /// Off until it has been on for long enough.
+    /// An input that is off until it has been on for long enough.
     #[must_use]
     pub const fn new() -> Debounce {
         Debounce { is_on: false, other: 0 }

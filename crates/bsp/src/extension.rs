@@ -1,8 +1,9 @@
-//! A 32-bit counter that wraps, extended to 64 bits without a lock.
+//! Extends a 32-bit counter that wraps to 64 bits, without a lock.
 //!
-//! The software part counts half periods, and its lowest bit says in which half of the counter it was last seen. A
-//! reader that comes between the wrap of the counter and the next [`Extension::follow`] finds that the two disagree, and corrects the
-//! result. So a reader gets the right count at every priority, also above that of the caller of `follow`.
+//! The software part counts half periods of the counter. Its lowest bit says in which half the counter was last seen. A
+//! reader between a wrap of the counter and the next [`Extension::follow`] sees that the two disagree, and corrects the
+//! result. A reader therefore gets the right count at every priority, also above the priority of the caller of
+//! `follow`.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -19,7 +20,7 @@ impl Extension {
         Extension { halves: AtomicU32::new(0) }
     }
 
-    /// Takes notice of the counter. To be called by one task only, and at least once in each half period.
+    /// Takes note of the counter. To be called by one task only, and at least once in each half period.
     pub fn follow(&self, counter: u32) {
         let halves = self.halves.load(Ordering::Relaxed);
         if halves & 1 != counter >> 31 {
@@ -27,7 +28,7 @@ impl Extension {
         }
     }
 
-    /// The extended count. The software part is read first: it may then be one half behind, never ahead.
+    /// The extended count. The software part is read first, so it may be one half period behind but never ahead.
     pub fn read(&self, counter: impl FnOnce() -> u32) -> u64 {
         let halves = self.halves.load(Ordering::Acquire);
         let within = counter() ^ (halves & 1) << 31;

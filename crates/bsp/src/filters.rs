@@ -1,35 +1,36 @@
-//! Which identifiers go to which receive FIFO, packed into the filter banks of bxCAN (RM0390, 30.7.4).
+//! Assignment of identifiers to the receive FIFOs, packed into the filter banks of bxCAN (RM0390, 30.7.4).
 //!
-//! A bank holds two pairs of identifier and mask of 16 bits. A pair, and not an entry of a list, because it takes the
-//! data frame and the remote frame of one identifier. What no bank accepts never reaches the core.
+//! A bank holds two pairs of identifier and mask with 16 bits each. A pair accepts both the data frame and the remote
+//! frame of an identifier, which an entry of an identifier list does not. A frame that no bank accepts never reaches
+//! the core.
 
 use heapless::Vec;
 
-/// Banks of CAN1 when CAN2 has none.
+/// Number of banks for CAN1 if CAN2 has none.
 pub const BANKS: usize = 28;
 
-/// Where a frame goes.
+/// Destination of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fifo {
     /// FIFO 0: NMT, SYNC and RPDO.
     Process,
-    /// FIFO 1: everything else.
+    /// FIFO 1: all other frames.
     Services,
 }
 
-/// One pair of a bank: a frame passes when `(its identifier ^ id) & mask == 0`.
+/// One pair of a bank: a frame passes if `(its identifier ^ id) & mask == 0`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
     /// Identifier, 11 bits.
     pub id: u16,
-    /// The bits that must agree.
+    /// Mask of the bits that must agree.
     pub mask: u16,
 }
 
 impl Pair {
     const ANY: Pair = Pair { id: 0, mask: 0 };
 
-    /// One identifier, data and remote frames.
+    /// A pair for one identifier, data and remote frames.
     #[must_use]
     pub const fn exactly(id: u16) -> Pair {
         Pair { id: id & 0x7FF, mask: 0x7FF }
@@ -39,17 +40,17 @@ impl Pair {
 /// One filter bank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bank {
-    /// Where its frames go.
+    /// Destination of the frames.
     pub fifo: Fifo,
-    /// A frame that agrees with one of the two pairs passes.
+    /// A frame that agrees with either pair passes.
     pub pairs: [Pair; 2],
 }
 
-/// The banks in order. Of two that accept a frame the first decides (RM0390, 30.7.4, filter priority rules).
+/// The banks in order. If two banks accept a frame, the first decides (RM0390, 30.7.4, filter priority rules).
 pub type Banks = Vec<Bank, BANKS>;
 
-/// Packs identifiers into banks; those of process data with the bits of them that count. When there are more than fit, the last bank
-/// passes every base frame to FIFO 1 and the protocol sorts them out; none is lost.
+/// Packs identifiers into banks; identifiers of process data come with a mask of the bits to compare. If they do not
+/// fit, the last bank passes every base frame to FIFO 1 and the protocol sorts the frames out, so no frame is lost.
 pub fn pack(process: impl Iterator<Item = (u16, u16)>, services: impl Iterator<Item = u16>) -> Banks {
     let mut banks = Banks::new();
     let process = process.map(|(id, mask)| Pair { id, mask });
@@ -62,7 +63,7 @@ pub fn pack(process: impl Iterator<Item = (u16, u16)>, services: impl Iterator<I
     banks
 }
 
-/// One bank that passes every base frame to FIFO 1.
+/// A single bank that passes every base frame to FIFO 1.
 #[must_use]
 pub fn everything() -> Banks {
     Banks::from_iter([EVERYTHING])
@@ -70,7 +71,7 @@ pub fn everything() -> Banks {
 
 const EVERYTHING: Bank = Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] };
 
-/// Adds banks for `pairs`; false when there is no bank left.
+/// Adds banks for `pairs`; false if no bank is left.
 fn fill(banks: &mut Banks, fifo: Fifo, mut pairs: impl Iterator<Item = Pair>) -> bool {
     while let Some(first) = pairs.next() {
         let pairs = [first, pairs.next().unwrap_or(first)];
@@ -89,7 +90,7 @@ mod tests {
         ids.into_iter().map(|id| (id, 0x7FF))
     }
 
-    /// The FIFO into which the hardware puts a frame, computed as the hardware does.
+    /// The FIFO into which the hardware puts a frame, by the rules of the hardware.
     fn route(banks: &Banks, id: u16) -> Option<Fifo> {
         let passes = |pair: &Pair| (id ^ pair.id) & pair.mask == 0;
         banks.iter().find(|bank| bank.pairs.iter().any(passes)).map(|bank| bank.fifo)

@@ -4,8 +4,8 @@ use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlashErrorKind;
 
-/// A range of addresses that may be read, erased and programmed. Offsets count from an origin, which is at the first of these
-/// addresses or before it.
+/// A range of addresses that may be read, erased and programmed. Offsets count from an origin, which is at or before
+/// the first of these addresses.
 #[derive(Clone, Debug)]
 pub struct FlashArea {
     origin: u32,
@@ -22,7 +22,7 @@ impl FlashArea {
     /// The address of `len` bytes at `offset`. Both must be multiples of `boundary`.
     ///
     /// # Errors
-    /// `OutOfBounds` when the bytes reach beyond the area, `NotAligned`.
+    /// `OutOfBounds` if the bytes reach beyond the area, `NotAligned`.
     pub fn address(&self, offset: u32, len: usize, boundary: u32) -> Result<u32, NorFlashErrorKind> {
         let out_of_bounds = NorFlashErrorKind::OutOfBounds;
         let len = u32::try_from(len).map_err(|_| out_of_bounds)?;

@@ -1,27 +1,28 @@
-//! How a node that is not sure of the bit rate comes on a bus: as a guest, who hurts nobody's frames.
+//! How a node that is not sure of the bit rate joins a bus: as a guest that disturbs no frames of others.
 //!
-//! | state | on the bus | it ends with |
+//! | state | on the bus | ends with |
 //! |---|---|---|
-//! | trying | yes, at a rate that was stored; nothing was understood yet | a frame that is understood: it stays. The first error: it searches |
-//! | searching | listens, one rate after the other | a frame that is understood: it stays, at that rate. |
-//! | resting | listens at 250 kbit/s | a frame that is understood: it stays. An error and no such frame soon: it searches |
-//! | staying | yes | nothing |
+//! | trying | yes, at a stored rate; no frame received yet | a received frame: staying; the first error: searching |
+//! | searching | listens, one rate after the other | a received frame: staying, at its rate |
+//! | resting | listens at 250 kbit/s | a received frame: staying; an error and no frame soon after: searching |
+//! | staying | yes | never |
 //!
-//! A guest without a stored rate says nothing before somebody else does: a bus may be silent because its nodes wait. A frame that
-//! nobody acknowledges is sent again and again, by a sender that soon is error passive; then the guest understands the frame too.
+//! A guest without a stored rate sends nothing before another node does: a bus may be silent because its nodes wait. A
+//! sender whose frame nobody acknowledges repeats the frame and soon becomes error passive; from then on the guest
+//! receives the frame too.
 
 use canopen::{Duration, Instant};
 
 use crate::bit_rate_detection::{Detector, Heard, Step};
 use crate::bit_timing::BitTiming;
 
-/// Where a node without a bit rate waits on a silent bus (as CMP 8271 does).
+/// The rate at which a node without a bit rate waits on a silent bus (as in CMP 8271).
 const ASSUMED: BitTiming = BitTiming::at(250);
-/// So long the frame of a sender that is alone may look like an error: 16 attempts of 135 bits and an error flag at 250 kbit/s
-/// make the sender error passive.
+/// Time for which the frame of a single sender may look like an error: after 16 attempts of 135 bits and an error flag
+/// at 250 kbit/s the sender is error passive.
 const ATTEMPTS: Duration = Duration::from_millis(12);
 
-/// The guest.
+/// The guest with its state.
 #[derive(Debug)]
 pub struct Guest(State);
 
@@ -29,13 +30,14 @@ pub struct Guest(State);
 enum State {
     Trying,
     Searching(Detector),
-    /// Since the first error.
+    /// With the time of the first error.
     Resting(Option<Instant>),
     Staying,
 }
 
 impl Guest {
-    /// A guest that begins at a rate that was stored ([`Step::Found`]), or listens ([`Step::Listen`]); the caller does that.
+    /// A guest that begins at a stored rate ([`Step::Found`]), or listens ([`Step::Listen`]); the caller carries out
+    /// the step.
     #[must_use]
     pub fn new(stored: Option<BitTiming>) -> (Guest, Step) {
         match stored {
@@ -44,26 +46,28 @@ impl Guest {
         }
     }
 
-    /// A guest that searches until it understands a frame, whatever the silence (automatic detection). It listens first.
+    /// A guest that searches until it receives a frame, even on a silent bus (automatic detection). Searching means
+    /// listening only.
     #[must_use]
     pub fn searching(now: Instant) -> (Guest, Step) {
         let (state, step) = search(now);
         (Guest(state), step)
     }
 
-    /// Whether it only listens.
+    /// Whether the guest only listens.
     #[must_use]
     pub fn is_listening(&self) -> bool {
         matches!(self.0, State::Searching(_) | State::Resting(_))
     }
 
-    /// Whether it has understood a frame and stays as it is.
+    /// Whether the guest has received a frame and stays at its rate.
     #[must_use]
     pub fn is_staying(&self) -> bool {
         matches!(self.0, State::Staying)
     }
 
-    /// Takes what was heard since the last step: go on as before, listen at a rate, or go on the bus ([`Step::Found`]).
+    /// Takes the events since the last step. The result: continue, listen at a rate, or go on the bus
+    /// ([`Step::Found`]).
     pub fn step(&mut self, heard: Heard, now: Instant) -> Step {
         let (state, step) = match (&mut self.0, heard) {
             (State::Staying, _)

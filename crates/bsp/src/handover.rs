@@ -1,27 +1,27 @@
-//! The note that the application and the bootloader leave each other in RAM that survives a reset: node-ID and bit rate in use,
-//! and whether the bootloader is to stay on the bus.
+//! The note that the application and the bootloader leave for each other in RAM that survives a reset: node-ID and bit
+//! rate in use, and whether the bootloader must stay on the bus.
 //!
-//! A bootloader that comes on a bus whose bit rate it does not know would destroy everybody's frames. So the application
-//! writes down what it uses, which under automatic detection is what it has found.
+//! A bootloader that joined a bus without knowing its bit rate would destroy the frames of others. The application
+//! therefore notes the rate in use, which under automatic detection is the detected one.
 
 use crate::bit_timing::BitTiming;
 
 /// The note.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Handover {
-    /// Node-ID in use; `None` for a node that waits for LSS to give it one.
+    /// Node-ID in use; `None` for a node that waits for LSS to assign one.
     pub node_id: Option<u8>,
-    /// Timing in use.
+    /// Bit timing in use.
     pub timing: BitTiming,
-    /// The bootloader was asked for (1F51h = 0 or 2): it stays although there is an application.
+    /// The bootloader was requested (1F51h = 0 or 2), so it stays although there is an application.
     pub stay: bool,
 }
 
-/// The note as it lies in RAM: the note and its complement. RAM after power-up holds no such pair by chance.
+/// The words in RAM: the note and its complement. Random content of RAM after power-up has no such pair.
 pub type Sealed = [u32; 2];
 
 impl Handover {
-    /// The words to keep.
+    /// The words to store.
     #[must_use]
     pub fn seal(&self) -> Sealed {
         let [low, high] = self.timing.kbit().to_le_bytes();
@@ -29,7 +29,7 @@ impl Handover {
         [note, !note]
     }
 
-    /// The note in the words, if there is one.
+    /// The note in the words; `None` without one.
     #[must_use]
     pub fn open(words: &Sealed) -> Option<Handover> {
         let [note, complement] = *words;

@@ -1,14 +1,15 @@
-//! Board support: everything that touches a register of the STM32F4, and the only crate with `unsafe`.
+//! Board support: all code that accesses registers of the STM32F4, and the only crate with `unsafe`.
 //!
-//! Logic without registers (bit timing, filter packing, the transmit queue, the extension of the counter, oversampling, supervision,
-//! the crash record, the copies in the backup SRAM, the counts of lost events) has modules of its own, which are tested on the host.
-//! The modules below `hardware` are built for the target only.
+//! Logic without registers (bit timing, filter packing, the transmit queue, the extension of the counter, oversampling,
+//! supervision, the crash record, the copies in the backup SRAM, the counts of lost events) has modules of its own,
+//! which are tested on the host. The modules below `hardware` are built for the target only.
 #![no_std]
-// On the host, where only the modules without hardware are: values are cut to the width of a register everywhere else.
+// Only for the host, which has the modules without hardware: all other code cuts values to the width of a register.
 #![cfg_attr(not(target_os = "none"), warn(clippy::pedantic))]
 #![deny(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 pub mod back_off;
+pub mod backup_copies;
 pub mod battery;
 pub mod bit_rate_detection;
 pub mod bit_timing;
@@ -21,7 +22,6 @@ pub mod filters;
 pub mod flash_area;
 pub mod guest;
 pub mod handover;
-pub mod kept;
 pub mod losses;
 pub mod mailbox;
 pub mod oversampling;

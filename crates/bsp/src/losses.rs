@@ -1,59 +1,60 @@
-//! Events that were lost and made good: counted wherever that is noticed, shown to the outside by a task of a low priority.
+//! Counts of hardware events that were lost and recovered from. The part that detects a loss counts it; a task of low
+//! priority shows the counts.
 //!
-//! Whatever waits for an event of the hardware has a deadline. When the deadline passes, the event counts as lost, what should
-//! have raised it is set up anew, and the node goes on.
+//! Every wait for a hardware event has a deadline. When the deadline passes, the event counts as lost, its source is
+//! set up again, and the node continues.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Kinds of events that can get lost.
+/// Kinds of events that can be lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A received frame that found no place in the FIFO or in the queue behind it.
+    /// A received frame for which the FIFO or the queue behind it had no room.
     Frame = 0,
     /// A millisecond of samples that was overwritten before it was collected.
     Millisecond = 1,
-    /// The sampling stood still, or its two streams were out of step; it was started anew.
+    /// The sampling had stopped, or its two streams were out of step; it was restarted.
     Sampling = 2,
-    /// A word of the absolute encoder that did not come whole; the next millisecond reads the next one.
+    /// An incomplete word of the absolute encoder; the next millisecond reads the next one.
     SsiWord = 3,
-    /// The copy of the count at the index was switched off, and is on again.
+    /// The stream that copies the count at the index was off; it was switched on again.
     Index = 4,
-    /// An alarm of the time base that was noticed by the time and not by its interrupt.
+    /// An alarm of the time base that was detected by its time and not by its interrupt.
     Alarm = 5,
-    /// A write to the memory behind the battery that did not arrive; the next millisecond writes again.
+    /// A failed write to the battery-backed memory; the next millisecond writes again.
     BackupWrite = 6,
-    /// An operation of the flash that did not end in time; whoever asked for it is told.
+    /// A flash operation that did not end in time; its caller gets an error.
     Flash = 7,
 }
 
-/// How many kinds of [`Event`] there are.
+/// Number of kinds of [`Event`].
 pub const EVENTS: usize = 8;
 
-/// How many of each have been lost since the start.
+/// The number of lost events of each kind since the start.
 #[derive(Debug, Default)]
 pub struct Losses([AtomicU32; EVENTS]);
 
 impl Losses {
-    /// None.
+    /// Counters at zero.
     #[must_use]
     pub const fn new() -> Losses {
         Losses([const { AtomicU32::new(0) }; EVENTS])
     }
 
-    /// One more.
+    /// Counts an event.
     pub fn count(&self, event: Event) {
         if let Some(counter) = self.0.get(event as usize) {
             counter.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// How many of one kind.
+    /// The count of one kind.
     #[must_use]
     pub fn of(&self, event: Event) -> u32 {
         self.0.get(event as usize).map_or(0, |counter| counter.load(Ordering::Relaxed))
     }
 
-    /// How many of each, in the order of [`Event`].
+    /// The counts of all kinds, in the order of [`Event`].
     #[must_use]
     pub fn all(&self) -> [u32; EVENTS] {
         self.0.each_ref().map(|counter| counter.load(Ordering::Relaxed))

@@ -1,12 +1,12 @@
-//! A frame in the registers of a mailbox (RM0390, 30.9.3); those of a transmit mailbox have the same layout.
+//! A frame in the registers of a mailbox (RM0390, 30.9.3); transmit mailboxes have the same layout.
 //!
-//! The reception of the crate bxcan is not used: bxcan takes the length code as it comes and indexes out of range at the codes 9 to
-//! 15, which any node may send for eight bytes (ISO 11898-1, 10.4.2.4).
+//! The crate bxcan is not used for reception: it does not limit the length code and indexes out of range at the codes 9
+//! to 15, which any node may send for eight bytes (ISO 11898-1, 10.4.2.4).
 
 use canopen::Frame;
 
 const EXTENDED: u32 = 1 << 2;
-/// RTR.
+/// RTR: remote frame.
 pub(crate) const REMOTE: u32 = 1 << 1;
 
 /// The registers RIR, RDTR, RDLR and RDHR.
@@ -23,7 +23,7 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// The frame; `None` when it has an extended identifier, which CANopen does not use.
+    /// The frame; `None` for an extended identifier, which CANopen does not use.
     #[must_use]
     pub fn frame(&self) -> Option<Frame> {
         let id = u16::try_from(self.rir >> 21).ok()?;

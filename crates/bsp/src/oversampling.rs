@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 pub const CHANNELS: usize = 5;
 /// Scans in a millisecond.
 pub const SCANS: usize = 16;
-/// Words with the conversions of a millisecond, two in each: the first is the lower half.
+/// Number of words with the conversions of a millisecond, two in each word, the first in the lower half.
 pub const WORDS: usize = SCANS * CHANNELS / 2;
 
 /// Largest result of a conversion.
@@ -19,8 +19,9 @@ const _: () = {
     );
 };
 
-/// The sum of each channel. Two scans are a whole number of words, and both halves of a word are added at once. The ten words of four
-/// scans are written out: the firmware is compiled for size, and inner loops would take three times as long.
+/// The sum of each channel. Two scans are a whole number of words, and both halves of a word are added at once. The ten
+/// words of four scans are written out, because the firmware is compiled for size and inner loops would take three
+/// times as long.
 #[allow(clippy::many_single_char_names)] // The ten words of four scans.
 pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
     let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
@@ -42,7 +43,7 @@ pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
 mod tests {
     use super::*;
 
-    /// As DMA leaves them, from the result of each conversion.
+    /// The buffer as DMA leaves it, from the result of each conversion.
     fn buffer(conversion: impl Fn(usize) -> u32) -> [AtomicU32; WORDS] {
         core::array::from_fn(|word| AtomicU32::new(conversion(2 * word) | conversion(2 * word + 1) << 16))
     }

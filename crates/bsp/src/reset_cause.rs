@@ -1,27 +1,28 @@
 //! Why the chip was reset, from the flags of `RCC_CSR` (RM0390, 6.3.21).
 
-/// The cause. The flags add up until they are cleared; the most telling one counts.
+/// The cause of a reset. The flags accumulate until they are cleared; the most specific one counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// The independent watchdog was not fed.
     IndependentWatchdog,
-    /// The window watchdog.
+    /// The window watchdog was not fed in time.
     WindowWatchdog,
     /// Forbidden entry into standby or stop.
     LowPower,
-    /// The program asked for it: NMT reset node, a crash, the debugger.
+    /// Requested by the program: NMT reset node, a crash, the debugger.
     Software,
     /// Power was switched on.
     PowerOn,
     /// The supply fell below the brown-out level.
     BrownOut,
-    /// The reset pin, which every other cause pulls as well.
+    /// The reset pin, which every other cause pulls too.
     Pin,
-    /// No flag is set: they were read and cleared before.
+    /// No flag is set: the flags were read and cleared before.
     Unknown,
 }
 
-/// Flags and what they mean, the most telling first: power-on sets the brown-out flag too, and all set the pin's.
+/// Flags and causes, the most specific first: power-on also sets the brown-out flag, and all causes set the flag of the
+/// pin.
 const FLAGS: [(u32, ResetCause); 7] = [
     (1 << 29, ResetCause::IndependentWatchdog),
     (1 << 30, ResetCause::WindowWatchdog),
@@ -33,26 +34,26 @@ const FLAGS: [(u32, ResetCause); 7] = [
 ];
 
 impl ResetCause {
-    /// The cause that a value of `RCC_CSR` tells.
+    /// The cause in a value of `RCC_CSR`.
     #[must_use]
     pub fn from_csr(csr: u32) -> ResetCause {
         let told = FLAGS.iter().find(|(flag, _)| csr & flag != 0);
         told.map_or(ResetCause::Unknown, |&(_, cause)| cause)
     }
 
-    /// Whether nobody asked for it: a watchdog, or a power-down mode that the images do not use.
+    /// Whether the reset was not requested: a watchdog, or a power-down mode that the images do not use.
     #[must_use]
     pub fn is_unexpected(self) -> bool {
         matches!(self, ResetCause::IndependentWatchdog | ResetCause::WindowWatchdog | ResetCause::LowPower)
     }
 
-    /// Whether the main supply was gone.
+    /// Whether the main supply was off.
     #[must_use]
     pub fn is_power_loss(self) -> bool {
         matches!(self, ResetCause::PowerOn | ResetCause::BrownOut)
     }
 
-    /// For the log.
+    /// Name for the log.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

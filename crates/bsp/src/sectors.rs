@@ -3,17 +3,17 @@
 /// First address of the flash.
 pub const FLASH: u32 = 0x0800_0000;
 const KIB: u32 = 1024;
-/// Of a part with 512 KiB; the larger ones go on in the same way.
+/// Sectors of a chip with 512 KiB; larger chips repeat the last size.
 static SIZES: [u32; 8] = [16 * KIB, 16 * KIB, 16 * KIB, 16 * KIB, 64 * KIB, 128 * KIB, 128 * KIB, 128 * KIB];
 
-/// A sector: what an erase erases.
+/// A sector: the unit of an erase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sector {
-    /// Its number, for SNB.
+    /// Number for SNB.
     pub number: u8,
-    /// Its first address.
+    /// First address.
     pub start: u32,
-    /// Its size in bytes.
+    /// Size in bytes.
     pub size: u32,
 }
 

@@ -1,9 +1,9 @@
-//! The serial number of 1018h sub-index 4 from the unique identifier of the chip.
+//! The serial number of 1018h sub-index 4, from the unique identifier of the chip.
 
-/// 32 bits of the 96 of the unique identifier (RM0390, 34.1): its CRC-32.
+/// The CRC-32 of the unique identifier of 96 bits (RM0390, 34.1).
 ///
-/// Two of a thousand boards share one with a probability of about 1 in 10,000. Where that is too much the production
-/// line must store a number of its own.
+/// In a thousand boards, two have the same number with a probability of about 1 in 10,000. Where that is too much, the
+/// production line must store its own numbers.
 #[must_use]
 pub fn serial_number(unique_id: &[u8; 12]) -> u32 {
     checksum::of(unique_id)

@@ -1,6 +1,6 @@
 //! The word of an encoder with synchronous serial interface (SSI), as an SPI clocks it in.
 
-/// Clocks that the longest frame takes: eight bytes.
+/// Number of clocks of the longest frame: eight bytes.
 pub const LONGEST: u32 = 64;
 
 /// Bits of one frame.
@@ -8,19 +8,19 @@ pub const LONGEST: u32 = 64;
 pub struct SsiWord {
     /// The bits, the last one in bit 0.
     pub bits: u64,
-    /// How many.
+    /// Number of bits.
     pub clocks: u32,
 }
 
-/// Bytes to clock in for a word of `length` bits: one bit of rest level before the word and at least one low bit after the word. An
-/// SPI clocks whole bytes, so up to seven more bits follow.
+/// Number of bytes to clock in for a word of `length` bits: one bit of rest level before the word, and at least one low
+/// bit after the word. An SPI clocks whole bytes, so up to seven more bits follow.
 #[must_use]
 pub fn bytes(length: u32) -> usize {
     let clocks = length.saturating_add(2).min(LONGEST);
     clocks.div_ceil(8) as usize
 }
 
-/// The bytes of a frame in the order in which they came, eight at most, each with its first bit on top.
+/// Packs the received bytes of a frame, eight at most, in their order, each with its first bit on top.
 #[must_use]
 pub fn pack(bytes: impl IntoIterator<Item = u8>) -> SsiWord {
     let bytes = bytes.into_iter().take(LONGEST as usize / 8);

@@ -1,31 +1,32 @@
-//! Whether the conversions of the ADC and the copies of the encoder's count are in step.
+//! Check that the conversions of the ADC and the copies of the encoder's count are in step.
 //!
-//! One timer starts both, and two DMA streams write them side by side, a scan of conversions for each copy. A stream that loses
-//! a single request would stay behind the other one for ever, and each count would be that of another scan.
+//! One timer starts both, and two DMA streams write them side by side: one copy for each scan of conversions. A stream
+//! that lost a single request would stay behind the other one for ever, and each count would belong to another scan.
 
 use crate::oversampling::{CHANNELS, SCANS};
 
-/// Scans in a round of both streams.
+/// Number of scans in a round of both streams.
 const ROUND: usize = 2 * SCANS;
 
-/// Where the two streams and the timer are.
+/// Progress of the two streams and the timer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Conversions that are still to come in this round.
+    /// Number of conversions still to come in this round.
     pub conversions_left: usize,
-    /// Copies that are still to come in this round.
+    /// Number of copies still to come in this round.
     pub copies_left: usize,
     /// Whether the timer is in the second half of its period. A scan lasts nearly the whole period.
     pub second_half: bool,
 }
 
 impl Progress {
-    /// The copy comes with the start of a scan, the conversions come during the scan.
+    /// Whether copies and conversions belong to the same scans. The copy comes at the start of a scan, the conversions
+    /// come during the scan.
     #[must_use]
     pub fn is_in_step(&self) -> bool {
         let converted = (ROUND * CHANNELS).saturating_sub(self.conversions_left);
         let (ended, is_under_way) = (converted / CHANNELS, !converted.is_multiple_of(CHANNELS));
-        // Without a conversion of its own yet, a scan has begun when the period has.
+        // A scan that has no conversion yet has begun if the period has just begun.
         let begun = ended + usize::from(is_under_way || !self.second_half);
         ROUND.saturating_sub(self.copies_left) % ROUND == begun % ROUND
     }
@@ -35,12 +36,13 @@ impl Progress {
 mod tests {
     use super::*;
 
-    /// All that can be seen in a round: the copies are `behind` requests late, and so are the conversions.
+    /// All possible observations in a round in which the copies, and the conversions, are late by so many requests.
     fn seen(copies_behind: usize, conversions_behind: usize) -> impl Iterator<Item = Progress> {
         (0..ROUND).flat_map(move |scan| {
             (0..=CHANNELS).flat_map(move |converted| {
                 [false, true].into_iter().filter_map(move |second_half| {
-                    // The last conversion ends, and the first does not, in the second half of the period.
+                    // In the first half of the period the last conversion is not done; in the second half the first one
+                    // is.
                     let is_possible = if second_half { converted > 0 } else { converted < CHANNELS };
                     let all = ROUND * CHANNELS;
                     let conversions = (scan * CHANNELS + converted + all - conversions_behind) % all;

@@ -1,4 +1,4 @@
-//! When the watchdog may be fed: after every supervised part has made progress since the last time.
+//! Decides when the watchdog is fed: after every supervised part has made progress since the last time.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -12,13 +12,13 @@ pub enum Part {
     Process = 2,
     /// The services task.
     Services = 4,
-    /// The task that stores parameters. It has the lowest priority, so a task that never ends starves this one as well.
+    /// The task that stores parameters. It has the lowest priority, so any task that never ends starves this one.
     Storage = 8,
 }
 
 const ALL: u8 = Part::Sampling as u8 | Part::Process as u8 | Part::Services as u8 | Part::Storage as u8;
 
-/// Which parts have made progress since the watchdog was last fed.
+/// The parts that have made progress since the watchdog was last fed.
 #[derive(Debug, Default)]
 pub struct Supervision {
     done: AtomicU8,
@@ -31,13 +31,13 @@ impl Supervision {
         Supervision { done: AtomicU8::new(0) }
     }
 
-    /// Notes that `part` has made progress. True when now all parts have: feed the watchdog.
+    /// Takes note that `part` has made progress. True if all parts now have: the caller feeds the watchdog.
     pub fn progress(&self, part: Part) -> bool {
         let done = self.done.fetch_or(part as u8, Ordering::Relaxed) | part as u8;
         let complete = done == ALL;
         if complete {
-            // A mark set by a higher priority between the two accesses is lost, which delays the next feed by one
-            // period of that part and no more.
+            // A mark set by a higher priority between the two accesses is lost, which only delays the next feed by one
+            // period of that part.
             self.done.store(0, Ordering::Relaxed);
         }
         complete

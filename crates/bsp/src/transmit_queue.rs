@@ -1,23 +1,23 @@
-//! Frames that wait for a transmit mailbox: in the order of their CAN-ID, first in first out among equals.
+//! Queue of frames for the transmit mailboxes: in the order of their CAN-ID, first in first out among equal CAN-IDs.
 //!
-//! The bus itself prefers the lowest identifier. A plain queue in front of the mailboxes would undo that: a heartbeat
-//! that came first would hold up a SYNC (priority inversion).
+//! The bus itself prefers the lowest identifier. A plain queue in front of the mailboxes would undo this order: an
+//! earlier heartbeat would hold up a SYNC (priority inversion).
 //!
-//! There are two kinds of frames, and the sender says which kind a frame is:
+//! The sender declares which of two kinds a frame is:
 //!
-//! * An event ([`Transmit::send`]) is sent once and in its order, however long it waits. When the queue is full, the sender keeps the event
-//!   and offers it again.
-//! * A state ([`Transmit::send_state`]), such as a heartbeat or a measured value, is worth nothing once there is a newer one. The newer
-//!   frame takes the place of the older one of its CAN-ID. So a node that more urgent frames keep silent for minutes sends one frame of
-//!   each CAN-ID in the first gap, and not a queue of old values.
+//! * An event ([`Transmit::send`]) is sent once and in its order, however long it waits. If the queue is full, the
+//!   sender keeps the event and offers it again.
+//! * A state ([`Transmit::send_state`]), such as a heartbeat or a measured value, is worthless once there is a newer
+//!   one. The newer frame replaces the older one of its CAN-ID. A node that is kept silent by more urgent frames for
+//!   minutes therefore sends one frame of each CAN-ID in the first gap, and not a queue of old values.
 //!
-//! The boot-up message is an event before which no other frame may be on the bus, although most CAN-IDs are more urgent. The queue
-//! holds all other frames back until the boot-up message has left its mailbox.
+//! The boot-up message is an event before which no other frame may be on the bus, although most CAN-IDs are more
+//! urgent. The queue holds all other frames back until the boot-up message has left its mailbox.
 
 use canopen::{Frame, QueueFull, Transmit};
 use heapless::Vec;
 
-/// Most frames that wait.
+/// Capacity in frames.
 pub const CAPACITY: usize = 32;
 
 /// The outcome of offering a frame to the mailboxes.
@@ -27,24 +27,24 @@ pub enum Offer {
     Taken,
     /// The frame is in the mailbox of this less urgent frame, which must be queued again.
     Replaced(Frame),
-    /// It has to wait.
+    /// The frame has to wait.
     Refused,
 }
 
 /// The transmit mailboxes of a controller.
 pub trait Mailboxes {
-    /// Puts a frame into a mailbox when that keeps the order on the bus.
+    /// Puts a frame into a mailbox if this keeps the order on the bus.
     fn offer(&mut self, frame: &Frame) -> Offer;
 
     /// Whether all mailboxes are empty: every frame that was taken has been sent.
     fn is_idle(&self) -> bool;
 }
 
-/// A frame that waits.
+/// A waiting frame.
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     frame: Frame,
-    /// A newer frame of the same identifier may take the place of this one.
+    /// A newer frame of the same identifier may replace this one.
     is_state: bool,
 }
 
@@ -58,11 +58,11 @@ enum BootUp {
     InMailbox,
 }
 
-/// The queue.
+/// The queue of frames that wait for a mailbox.
 #[derive(Debug, Default)]
 pub struct TransmitQueue {
     boot_up: BootUp,
-    /// The most urgent frame is the last one.
+    /// The waiting frames; the most urgent one is last.
     waiting: Vec<Waiting, CAPACITY>,
 }
 
@@ -86,13 +86,13 @@ impl TransmitQueue {
                 self.waiting.pop();
             }
             if let Offer::Replaced(other) = offer {
-                // The frame that left made room for this one.
+                // The frame just removed has left room for this one.
                 let _ = self.push_first(other);
             }
         }
     }
 
-    /// The frame that is to go into a mailbox next. The boot-up message has all mailboxes for itself.
+    /// The next frame for a mailbox. The boot-up message has all mailboxes for itself.
     fn next(&mut self, mailboxes: &impl Mailboxes) -> Option<Frame> {
         if !matches!(self.boot_up, BootUp::Sent) && !mailboxes.is_idle() {
             return None;
@@ -104,31 +104,33 @@ impl TransmitQueue {
         self.waiting.last().map(|waiting| waiting.frame)
     }
 
-    /// Whether nothing waits.
+    /// Whether no frame waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.waiting.is_empty() && !matches!(self.boot_up, BootUp::Waits(_))
     }
 
-    /// Drops everything that waits.
+    /// Drops all waiting frames.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.boot_up = BootUp::Sent;
     }
 
-    /// Adds a frame that comes back from a mailbox. The frame was queued before all others of its identifier, so its place is before
-    /// them. The mailboxes hold one frame of an identifier at most, so at most one such frame waits; it counts as an event.
+    /// Adds a frame that comes back from a mailbox. The frame was queued before all others of its identifier, so it
+    /// goes in front of them. The mailboxes hold at most one frame of an identifier, so at most one such frame waits;
+    /// it counts as an event.
     fn push_first(&mut self, frame: Frame) -> Result<(), QueueFull> {
         let index = self.waiting.partition_point(|other| other.frame.id() >= frame.id());
         self.insert(index, Waiting { frame, is_state: false })
     }
 
-    /// The place behind all frames of this identifier.
+    /// The place after all frames of this identifier.
     fn place(&self, frame: &Frame) -> usize {
         self.waiting.partition_point(|other| other.frame.id() > frame.id())
     }
 
-    /// Puts a frame at a place and moves all frames behind the place one further. `Vec::insert` would panic at a place behind the end.
+    /// Inserts a frame at a place and moves all frames from there on by one place. `Vec::insert` would panic at a place
+    /// beyond the end.
     fn insert(&mut self, index: usize, new: Waiting) -> Result<(), QueueFull> {
         if self.waiting.is_full() {
             return Err(QueueFull);
@@ -142,13 +144,13 @@ impl TransmitQueue {
 }
 
 impl Transmit for TransmitQueue {
-    /// Adds an event behind the frames of its identifier.
+    /// Adds an event after the frames of its identifier.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.insert(self.place(&frame), Waiting { frame, is_state: false })
     }
 
-    /// Adds a state behind the frames of its identifier. When the last of these frames is a state too, the new one takes its place. An
-    /// event between two states keeps both.
+    /// Adds a state after the frames of its identifier. If the last of these frames is a state too, the new one
+    /// replaces it. An event between two states keeps both.
     fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
         let index = self.place(&frame);
         match self.waiting.get_mut(index).filter(|last| last.is_state && last.frame.id() == frame.id()) {
@@ -158,7 +160,7 @@ impl Transmit for TransmitQueue {
         Ok(())
     }
 
-    /// Takes the boot-up message, for which there is a place of its own.
+    /// Takes the boot-up message, which has its own place.
     fn send_boot_up(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.boot_up = BootUp::Waits(frame);
         Ok(())
@@ -175,7 +177,8 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Mailboxes that behave as bxCAN under its driver: strictly more urgent frames only, the least urgent one gives way.
+    /// Mailboxes that behave like bxCAN under its driver: a frame is accepted only if it is more urgent than all
+    /// pending ones. If all mailboxes are full, the least urgent frame gives way.
     #[derive(Default)]
     struct Fake {
         pending: Vec<Frame>,
@@ -296,8 +299,8 @@ mod tests {
         assert_eq!(order, [(0x181, 0), (0x281, 0), (0x581, 0), (0x701, 1), (0x701, 4)]);
     }
 
-    /// Events and states of the same and of other identifiers, on a bus that comes and goes: every event arrives once and in
-    /// the order of its identifier, and of the states the newest.
+    /// Events and states of the same and of other identifiers, on a bus that comes and goes: every event arrives once
+    /// and in the order of its identifier, and of the states the newest arrives.
     #[test]
     fn no_event_is_lost_or_passed_whatever_waits_beside_it() {
         const IDS: [u16; 4] = [0x181, 0x183, 0x281, 0x701];
@@ -321,7 +324,7 @@ mod tests {
             // For a quarter of the time there is no bus.
             let is_off = (sent.iter().map(|count| u32::from(*count)).sum::<u32>() / 64).is_multiple_of(4);
             match choice {
-                // A sender that finds no room comes again with the same event.
+                // A sender that finds no room offers the same event again.
                 0..6 if queue.send(message(IDS[place], true, sent[place])).is_ok() => sent[place] += 1,
                 6..10 => {
                     state = state.wrapping_add(1);

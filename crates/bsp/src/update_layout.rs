@@ -1,4 +1,4 @@
-//! Where an update puts things: the regions `SECURITY`, `IMAGE_HEADER`, `APPLICATION`, `STAGING` and `KEPT` of memory.x.
+//! Memory layout of an update: the regions `SECURITY`, `IMAGE_HEADER`, `APPLICATION`, `STAGING` and `KEPT` of memory.x.
 
 use update::{Area, Layout};
 

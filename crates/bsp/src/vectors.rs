@@ -1,4 +1,4 @@
-//! Whether the first words of an image can be a vector table: what the bootloader checks before it jumps.
+//! Check whether the first words of an image can be a vector table, before the bootloader jumps to the image.
 
 use core::ops::Range;
 
@@ -10,8 +10,8 @@ pub struct Vectors {
 }
 
 impl Vectors {
-    /// The first two words of a vector table: `None` unless the stack lies in `ram` and the entry, with the Thumb bit
-    /// set, in `image`. Erased flash has neither.
+    /// The first two words of a vector table; `None` unless the stack lies in `ram`, and the entry, with the Thumb bit
+    /// set, lies in `image`. Erased flash fails both conditions.
     #[must_use]
     pub fn check(words: [u32; 2], ram: &Range<u32>, image: &Range<u32>) -> Option<Vectors> {
         let [stack, reset] = words;

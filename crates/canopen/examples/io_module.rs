@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! io_module --eds FILE            writes its data sheet
-//! io_module HOST:PORT BUS NODE    runs on a bus of a socketcand server, such as `cargo sim -- --socketcand 127.0.0.1:29536`
+//! io_module HOST:PORT BUS NODE    runs on a bus of a socketcand server, such as
+//!                                 `cargo sim -- --socketcand 127.0.0.1:29536`
 //! ```
 //!
-//! The process is played on standard input and output: `inputs 5` and `analogue 1200` say what is connected, and each
-//! change of the outputs is printed as `outputs 3`.
+//! The process is simulated on standard input and output: `inputs 5` and `analogue 1200` set the connected signals, and
+//! each change of the outputs is printed as `outputs 3`.
 
 mod socketcand;
 
@@ -22,7 +23,7 @@ use socketcand::Bus;
 
 // ------------------------------------------------------------------------------------------------- object dictionary
 
-/// A parameter of all eight channels, a bit each.
+/// A parameter of all eight channels, one bit each.
 const fn bits(index: u16, name: &'static str, default: i64) -> [Object; 2] {
     let row = Object::new(index, 1, name, Type::Unsigned8, Access::ReadWrite);
     [Object::highest(index, 1, name), row.value(default).stored(Group::Application)]
@@ -48,7 +49,7 @@ const ROWS: &[Object] = canopen::rows!(
     objects::error_behaviour(1),
     objects::rpdo(1, &[OUTPUTS]),
     objects::tpdo(1, &[INPUTS]),
-    // Type 254: the application says when, as the delta demands.
+    // Type 254: the application decides when to send, by the delta value.
     objects::with(objects::tpdo(2, &[ANALOGUE]), 2, 254),
     [Object::highest(0x6000, 1, "Read input 8 bit"), INPUTS],
     bits(0x6002, "Polarity input 8 bit", 0),
@@ -67,7 +68,7 @@ const ROWS: &[Object] = canopen::rows!(
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-/// Where the values are, found when this is compiled.
+/// The places of the values, found at compile time.
 const READ: Field = DICTIONARY.field(0x6000, 1);
 const POLARITY_IN: Field = DICTIONARY.field(0x6002, 1);
 const FILTER: Field = DICTIONARY.field(0x6003, 1);
@@ -81,17 +82,17 @@ const DELTA: Field = DICTIONARY.field(0x6426, 1);
 
 // ------------------------------------------------------------------------------------------------------- application
 
-/// How often the inputs are read, and how long a filtered input must be the same.
+/// Interval at which the inputs are read. `FILTER_READS`: number of equal reads for a filtered input.
 const PERIOD: canopen::Duration = canopen::Duration::from_millis(10);
 const FILTER_READS: u8 = 5;
 
-/// The pins, and what is between them and the objects.
+/// The pins, and the state between the pins and the objects.
 #[derive(Default)]
 struct Io {
     inputs: u8,
     analogue: i16,
     outputs: u8,
-    /// What the inputs were, for how many reads, and what has come through the filter.
+    /// The inputs at the last read, the number of equal reads, and the filtered inputs.
     last: u8,
     steady: u8,
     filtered: u8,
@@ -100,7 +101,7 @@ struct Io {
 }
 
 impl Io {
-    /// Reads the inputs into the dictionary. Whether the analogue value has to be sent.
+    /// Reads the inputs into the dictionary. Returns whether the analogue value has to be sent.
     fn sample(&mut self, image: &mut [u8]) -> bool {
         self.steady = if self.inputs == self.last { (self.steady + 1).min(FILTER_READS) } else { 0 };
         self.last = self.inputs;
@@ -116,12 +117,12 @@ impl Io {
         is_due
     }
 
-    /// The outputs as they were written.
+    /// Applies the written outputs.
     fn write_outputs(&mut self, image: &[u8]) {
         self.set(WRITE.u8(image) ^ POLARITY_OUT.u8(image));
     }
 
-    /// What the outputs do when nobody controls them any more.
+    /// Sets the outputs to their error values, when nobody controls them any more.
     fn fail(&mut self, image: &[u8]) {
         let (mode, value) = (ERROR_MODE.u8(image), ERROR_VALUE.u8(image));
         self.set(self.outputs & !mode | value & mode);
@@ -167,7 +168,7 @@ fn now(since: std::time::Instant) -> Instant {
     Instant(u64::try_from(since.elapsed().as_micros()).unwrap_or(u64::MAX))
 }
 
-/// Runs until the bus is gone.
+/// Runs until the connection to the bus is lost.
 fn run(
     device: &mut Device,
     bus: &mut Bus,
@@ -186,7 +187,7 @@ fn run(
         while let Some(action) = next.action {
             next = match action {
                 Action::ResetNode | Action::ResetCommunication => device.start(now(start), bus),
-                // Nothing is filtered, and there is one bit rate, no bootloader and no memory.
+                // There are no acceptance filters, only one bit rate, no bootloader and no memory.
                 _ => device.poll(now(start), bus),
             };
         }
@@ -197,7 +198,7 @@ fn run(
     }
 }
 
-/// Takes what is connected, and publishes what it means.
+/// Takes the connected signals, and publishes the resulting values.
 fn read_process(device: &mut Device, bus: &mut Bus, process: &Receiver<String>, now: Instant) -> Next {
     for line in process.try_iter() {
         let io = device.application_mut();
@@ -233,7 +234,7 @@ fn main() -> io::Result<()> {
         if let Ok(mut bus) = Bus::open(address, bus) {
             let Err(error) = run(&mut device, &mut bus, &process, start);
             eprintln!("the bus is gone: {error}");
-            // To the outputs, a bus that is gone is a controller that is off the bus.
+            // For the outputs, a lost connection is the same as bus-off.
             let _ = device.on_bus(BusEvent::BusOff, now(start));
         }
         std::thread::sleep(Duration::from_millis(100));

@@ -1,4 +1,4 @@
-//! Every codec: parse of encode is the identity, and any bytes parse or are refused.
+//! Every codec: parsing an encoded value gives the value back, and any bytes are either parsed or refused.
 
 use canopen::emcy::Message;
 use canopen::lss::{self, BitRate, Bound, Part};
@@ -140,7 +140,7 @@ proptest! {
         prop_assert_eq!(Response::parse(response.encode()), Some(response));
     }
 
-    /// What was accepted means the same after a round trip, whatever its reserved bits were.
+    /// An accepted frame means the same after a round trip, whatever its reserved bits.
     #[test]
     fn any_eight_bytes_parse_or_are_refused(frame in any::<[u8; 8]>()) {
         if let Some(request) = Request::parse(&frame) {

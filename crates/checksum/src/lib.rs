@@ -1,12 +1,12 @@
-//! CRC-32 (ISO HDLC, the one of Ethernet and zip), four bits at a time. Crate `crc` has a table of 1 KiB, for which an image
-//! has no room, or none: then the CRC of an application takes 0.1 s at every start.
+//! CRC-32 (ISO HDLC, as in Ethernet and zip), four bits at a time. The crate `crc` either needs a table of 1 KiB, for
+//! which an image has no room, or works without a table, and the CRC of an application then takes 0.1 s at every start.
 #![no_std]
 #![forbid(unsafe_code)]
 
 /// The polynomial 04C1 1DB7h with its bits reversed.
 const POLYNOMIAL: u32 = 0xEDB8_8320;
 
-/// What four bits add.
+/// Contribution of four bits to the CRC.
 #[allow(clippy::indexing_slicing)] // Computed by the compiler.
 static TABLE: [u32; 16] = {
     let mut table = [0; 16];
@@ -24,18 +24,18 @@ static TABLE: [u32; 16] = {
     table
 };
 
-/// A CRC in the making.
+/// A CRC that is being computed.
 #[derive(Clone, Debug)]
 pub struct Digest(u32);
 
-/// The CRC of nothing yet.
+/// Starts a CRC.
 #[must_use]
 pub fn begin() -> Digest {
     Digest(u32::MAX)
 }
 
 impl Digest {
-    /// Goes on with these bytes.
+    /// Adds these bytes.
     #[inline(never)]
     pub fn update(&mut self, bytes: &[u8]) {
         self.0 = bytes.iter().fold(self.0, |crc, byte| {
@@ -51,7 +51,7 @@ impl Digest {
     }
 }
 
-/// Four bits.
+/// Processes four bits.
 #[allow(clippy::indexing_slicing)] // Four bits index sixteen entries.
 fn half(crc: u32) -> u32 {
     crc >> 4 ^ TABLE[(crc & 15) as usize]

@@ -1,4 +1,4 @@
-//! The application of the CANopen device: what the node adds to CiA 301, and its profile.
+//! The application of the CANopen device: the additions of the node to CiA 301, and its profile.
 
 use canopen::dictionary::{Entry, Group, Groups};
 use canopen::emcy::Fault;
@@ -17,24 +17,24 @@ use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
 use crate::trial::ProgramTrial;
 
-/// How many kinds of lost events there are: sub-indexes 1 to this one of 2001h.
+/// Number of kinds of lost events: sub-indexes 1 to this one of 2001h.
 pub const LOST_EVENTS: usize = LOST_EVENT_KINDS as usize;
 
-/// The application at work.
+/// The application with its state.
 #[derive(Debug)]
 pub(crate) struct NodeApplication {
     pub(crate) setup: Setup,
     pub(crate) configured: Configured,
     pub(crate) profile: AnyProfile,
-    /// As last published: a reset of the dictionary does not reset what is measured.
+    /// The last published snapshot: a reset of the dictionary does not reset the measured values.
     pub(crate) snapshot: Snapshot,
     /// The flags of active faults. A reset of the dictionary does not end a fault.
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
-    /// As counted by the firmware (2001h).
+    /// Counters of lost events, as counted by the firmware (2001h).
     pub(crate) lost_events: [u32; LOST_EVENTS],
     pub(crate) trial: ProgramTrial,
-    /// Who may change the program (2003h).
+    /// Permission to change the program (2003h).
     pub(crate) authorisation: Authorisation,
     buffer: TransferBuffer,
 }
@@ -55,7 +55,7 @@ impl NodeApplication {
         }
     }
 
-    /// Shows what was measured.
+    /// Shows the measured values.
     pub(crate) fn show_values(&mut self, image: &mut [u8]) {
         self.profile.publish(&self.snapshot, image);
     }
@@ -65,7 +65,7 @@ impl NodeApplication {
         self.profile.show_flags(self.flags, image);
     }
 
-    /// Shows the personality after the next reset.
+    /// Shows the personality of the next start.
     pub(crate) fn show_personality(&self, image: &mut [u8]) {
         self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
     }
@@ -160,7 +160,7 @@ impl Application for NodeApplication {
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {
-        // The calibration is that of the device: a dictionary without it leaves it alone.
+        // The calibration belongs to the device: a dictionary without calibration objects leaves the stored one alone.
         if self.setup.personality.has_group(group) {
             self.stored.get(group)
         } else {

@@ -1,4 +1,5 @@
-//! 2003h: who may change the program (docs/update.md): whoever answers the challenge of this start, where the bootloader has a key.
+//! 2003h: permission to change the program (docs/update.md). If the bootloader has a key, a client must answer the
+//! challenge of this start.
 
 use canopen::sdo::Abort;
 use profiles::communication::PROGRAM_AUTHORISATION;
@@ -8,19 +9,19 @@ use crate::Protocol;
 use crate::application::NodeApplication;
 
 impl Protocol {
-    /// What the bootloader has left. To be called before the start.
+    /// Takes the authorisation that the bootloader has left. To be called before the start.
     pub fn set_authorisation(&mut self, authorisation: Authorisation) {
         self.device.application_mut().authorisation = authorisation;
     }
 }
 
 impl NodeApplication {
-    /// Refuses whoever has not answered the challenge.
+    /// Refuses a change of the program until the challenge has been answered.
     pub(crate) fn admit(&self) -> Result<(), Abort> {
         if self.authorisation.is_open() { Ok(()) } else { Err(Abort::DeviceState) }
     }
 
-    /// 2003h:3 is written.
+    /// Handles a write to 2003h:3.
     pub(crate) fn answer(&mut self, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         if !self.authorisation.asks() {
             return Err(Abort::DeviceState);

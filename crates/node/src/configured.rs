@@ -14,13 +14,13 @@ pub(crate) struct Configured {
 }
 
 impl Configured {
-    /// As it was when the node was set up.
+    /// The configuration with which the node was set up.
     pub(crate) fn of(setup: &Setup) -> Configured {
         let lss = Configuration { node_id: setup.node_id, bit_rate: setup.bit_rate };
         Configured { lss, personality: setup.personality }
     }
 
-    /// As it is when the job is done.
+    /// The configuration after a job.
     pub(crate) fn after(self, job: Job) -> Configured {
         match job {
             Job::Configure(lss) => Configured { lss, ..self },

@@ -1,4 +1,4 @@
-//! Every fault of the node: its own, and those of the profiles. The faults of communication are the device's
+//! All faults of the node: its own and those of the profiles. Faults of the communication belong to the device
 //! ([`canopen::Fault`]).
 
 use canopen::Condition;
@@ -11,14 +11,14 @@ const fn fault(name: &'static str, code: u16, flags: Flags) -> Fault {
 
 /// The parameter store cannot be used.
 pub const PARAMETER_STORE: Fault = fault("ParameterStore", 0x5003, Flags::system(2));
-/// The device record (node-ID, bit rate, personality) could not be read: the defaults hold.
+/// The device record (node-ID, bit rate, personality) could not be read, so the defaults are in use.
 pub const BOOT_DATA: Fault = with_detail("BootData", DEFAULTS_HOLD);
-/// The newest device record could not be read: the record before holds.
+/// The newest device record could not be read, so the record before is in use.
 pub const OLDER_BOOT_DATA: Fault = with_detail("OlderBootData", OLDER_HOLDS);
-/// The node restarted without having been told to.
+/// The node was reset without a command.
 pub const UNEXPECTED_RESET: Fault = fault("UnexpectedReset", 0x6101, Flags::system(6));
 
-/// A new program has failed its trial, and the one before is back (2002h).
+/// A new program has failed its trial, and the previous program was restored (2002h).
 pub const PROGRAM_TAKEN_BACK: Fault = fault("ProgramTakenBack", 0x6102, Flags::NONE);
 
 /// First byte of the error field of an EMCY about stored data, as in [`canopen::Fault::OlderData`] and
@@ -31,7 +31,7 @@ const fn with_detail(name: &'static str, holds: u8) -> Fault {
     Fault { name, condition, flags: Flags::system(3) }
 }
 
-/// The faults that no profile finds.
+/// The node's own faults, which no profile detects.
 const OWN: &[Fault] = &[PARAMETER_STORE, BOOT_DATA, OLDER_BOOT_DATA, UNEXPECTED_RESET, PROGRAM_TAKEN_BACK];
 
 const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
@@ -39,7 +39,7 @@ const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 /// All faults, in the order of their numbers ([`canopen::Fault::Application`]).
 pub static FAULTS: [Fault; count(LISTS)] = gather(LISTS);
 
-/// The faults as the bus shows them, in the same order.
+/// The faults with their error codes, in the same order.
 pub(crate) const CONDITIONS: [Condition; count(LISTS)] = {
     let faults: [Fault; count(LISTS)] = gather(LISTS);
     let mut conditions = [Condition::new(0); count(LISTS)];
@@ -57,8 +57,8 @@ pub(crate) fn number(fault: &Fault) -> Option<u8> {
     numbered.find(|(_, known)| *known == fault).map(|(number, _)| number)
 }
 
-/// The flag of a storage group whose values could not be loaded. Without its calibration, the sensor runs with that of no
-/// device.
+/// The flag of a storage group whose values could not be loaded. Without its calibration, the sensor runs with default
+/// values that fit no device.
 pub(crate) fn flag_of(group: Group) -> Flags {
     match group {
         Group::Calibration => Flags::sensor(0),

@@ -1,4 +1,4 @@
-//! Faults: from the profile, from the bus, and from the firmware.
+//! Faults reported by the profile, the bus and the firmware.
 
 use canopen::{BusEvent, ErrorClass, Instant};
 use profiles::Snapshot;
@@ -6,7 +6,7 @@ use profiles::fault::{Fault, Flags};
 
 use crate::{Next, Protocol, fault};
 
-/// Which faults of the profile the values of a millisecond show: a bit for each, in the order of the profile.
+/// The profile's faults that the values of a millisecond show: one bit for each, in the order of the profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Shown(u32);
 
@@ -28,10 +28,10 @@ impl Protocol {
         self.note(next)
     }
 
-    /// Sets or clears a fault of the [list](crate::FAULTS): in the flags of 3000h where there are any, in the error register,
-    /// and with an EMCY.
+    /// Sets or clears a fault of the [list](crate::FAULTS): in the flags of 3000h if the profile has them, in the error
+    /// register, and with an EMCY.
     pub fn set_fault(&mut self, fault: &Fault, active: bool, now: Instant) -> Next {
-        // A fault that is in no list has no bit, and is not signalled.
+        // A fault that is not in the list has no bit and is not signalled.
         let number = fault::number(fault).unwrap_or(u8::MAX);
         self.device.application_mut().flags.set(fault.flags, active);
         self.device.show(|application, image| application.show_flags(image));
@@ -40,7 +40,7 @@ impl Protocol {
         if is_error { self.device.error(ErrorClass::DEVICE) } else { next }
     }
 
-    /// Sets and clears the faults of the profile that are other ones than before. The services send them.
+    /// Sets and clears the profile's faults that have changed. The services task sends the EMCYs.
     pub(crate) fn follow_faults(&mut self, Shown(shown): Shown, now: Instant) {
         let snapshot = self.device.application().snapshot;
         let Shown(before) = core::mem::replace(&mut self.shown, Shown(shown));

@@ -1,17 +1,17 @@
-//! The identity of the device as the parameter store has it, and whether the record could be read.
+//! The identity of the device in the parameter store, and whether the record could be read.
 
 use embedded_storage::nor_flash::ReadNorFlash;
-use storage::{DeviceRecord, Group, Health, View};
+use storage::{DeviceRecord, Health, ParameterGroup, View};
 
 use crate::Fault;
 use crate::fault::{BOOT_DATA, OLDER_BOOT_DATA};
 
-/// The device record as the node starts with it.
+/// The device record at the start of the node.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
-    /// Node-ID, bit rate and personality; `None` where nothing is stored or nothing can be read.
+    /// Node-ID, bit rate and personality; `None` if nothing is stored or nothing can be read.
     pub record: Option<DeviceRecord>,
-    /// The fault to be told once the node has booted up (EMCY 6301h); `None` where the record is what was stored last.
+    /// The fault to be reported after the boot-up message (EMCY 6301h); `None` if the last stored record was read.
     pub fault: Option<&'static Fault>,
 }
 
@@ -20,8 +20,8 @@ impl Identity {
     #[inline(never)]
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Identity {
         let record = view.device().ok().flatten();
-        let is_stored = !matches!(view.load(Group::Device, &mut [0; DeviceRecord::ROOM]), Ok(None));
-        let fault = match (view.health(Group::Device), record) {
+        let is_stored = !matches!(view.load(ParameterGroup::Device, &mut [0; DeviceRecord::ROOM]), Ok(None));
+        let fault = match (view.health(ParameterGroup::Device), record) {
             (Health::Good, Some(_)) => None,
             (Health::Good, None) => is_stored.then_some(&BOOT_DATA),
             (_, None) => Some(&BOOT_DATA),

@@ -1,8 +1,8 @@
-//! One CANopen sensor node: everything that is its state, in two values that two priorities of the firmware own.
+//! One CANopen sensor node. Its whole state is in two values that belong to two priorities of the firmware.
 //!
-//! [`Protocol`] is the CANopen device, [`Measurement`] the sampling half of its profile. A [`Snapshot`] goes from the second
-//! to the first once a millisecond, [`Parameters`] go back when they have changed; each is one consistent set of values.
-//! Measuring, and the meaning of the profile objects, are in the crate `profiles`.
+//! [`Protocol`] is the CANopen device, [`Measurement`] the sampling half of its profile. Once a millisecond a
+//! [`Snapshot`] goes from the measurement to the protocol; [`Parameters`] go the other way when they have changed. Each
+//! is one consistent set of values. Measuring and the behaviour of the profile objects are in the crate `profiles`.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
@@ -13,9 +13,9 @@ mod configured;
 pub mod fault;
 mod faults;
 mod identity;
-mod lasting;
 mod lost_events;
 mod packed;
+mod position_record;
 mod protocol;
 mod setup;
 mod store_job;
@@ -30,7 +30,7 @@ pub use canopen::nmt::State;
 pub use canopen::{Action, BusEvent, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 pub use fault::FAULTS;
 pub use identity::Identity;
-pub use lasting::LastingRecord;
+pub use position_record::StoredPositionRecord;
 pub use profiles::fault::Fault;
 pub use profiles::{Measurement, Parameters, Personality, Snapshot};
 pub use protocol::Protocol;

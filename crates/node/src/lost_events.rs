@@ -1,4 +1,4 @@
-//! 2001h: events of the hardware that were lost and made good, counted since the start.
+//! 2001h: events of the hardware that were lost and recovered from, counted since the start.
 
 use profiles::communication;
 
@@ -6,7 +6,7 @@ use crate::Protocol;
 use crate::application::{LOST_EVENTS, NodeApplication};
 
 impl Protocol {
-    /// Shows how many events have been lost since the start, in the order of the sub-indexes of 2001h.
+    /// Shows the numbers of lost events since the start, in the order of the sub-indexes of 2001h.
     pub fn show_lost_events(&mut self, counts: &[u32; LOST_EVENTS]) {
         self.device.application_mut().lost_events = *counts;
         self.device.show(|application, image| application.show_lost_events(image));

@@ -1,4 +1,4 @@
-//! The packed values of the storage groups, as the dictionary packs and the parameter store holds them.
+//! The packed values of the storage groups, in the form that the parameter store holds.
 
 use canopen::dictionary::Group;
 use heapless::{Vec, VecView};
@@ -9,8 +9,8 @@ const CALIBRATION: usize = profiles::packed_size(Group::Calibration);
 const _: () = assert!(COMMUNICATION <= storage::MAX_VALUE && APPLICATION <= storage::MAX_VALUE);
 const _: () = assert!(CALIBRATION <= storage::MAX_VALUE);
 
-/// The packed values of every group, each with room for those of the largest dictionary. Nothing but zeros while there are
-/// none, so no copy of them lies in flash.
+/// The packed values of every group, with room for the largest dictionary. Empty values are all zeros, so the initial
+/// value needs no copy in flash.
 #[derive(Debug)]
 pub(crate) struct PackedGroups {
     communication: Vec<u8, COMMUNICATION>,
@@ -44,7 +44,7 @@ impl PackedGroups {
         }
     }
 
-    /// Hands out all the room of a group; `fill` says how many bytes of it count.
+    /// Gives `fill` all the room of a group; `fill` returns the number of bytes in use.
     pub(crate) fn fill(&mut self, group: Group, fill: impl FnOnce(&mut [u8]) -> usize) {
         let values = self.get_mut(group);
         values.clear();
@@ -53,7 +53,7 @@ impl PackedGroups {
         values.truncate(len);
     }
 
-    /// Takes these values; whether there is room for them.
+    /// Takes these values; returns whether there is room for them.
     pub(crate) fn replace(&mut self, group: Group, packed: &[u8]) -> bool {
         let values = self.get_mut(group);
         values.clear();
@@ -61,11 +61,11 @@ impl PackedGroups {
     }
 }
 
-/// Under which name the parameter store holds a group.
-pub(crate) const fn record_of(group: Group) -> storage::Group {
+/// The group of the parameter store that holds a group of the dictionary.
+pub(crate) const fn record_of(group: Group) -> storage::ParameterGroup {
     match group {
-        Group::Communication => storage::Group::Communication,
-        Group::Application => storage::Group::Application,
-        Group::Calibration => storage::Group::Calibration,
+        Group::Communication => storage::ParameterGroup::Communication,
+        Group::Application => storage::ParameterGroup::Application,
+        Group::Calibration => storage::ParameterGroup::Calibration,
     }
 }

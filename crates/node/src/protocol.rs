@@ -1,4 +1,4 @@
-//! The protocol half: the CANopen device with everything it owns.
+//! The protocol half: the CANopen device and its state.
 
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
@@ -9,24 +9,25 @@ use crate::application::NodeApplication;
 use crate::faults::Shown;
 use crate::{Next, Setup};
 
-/// The sample of this millisecond may have been taken, and the next one may have begun, before there were new parameters.
+/// Samples that may have been taken with the old parameters: the sample of this millisecond may have been taken, and
+/// the next one may have begun, before the new parameters arrived.
 const OLDER_SAMPLES: u8 = 3;
 
-/// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call. Every
-/// call returns what follows from it: see [`Next`].
+/// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
+/// Every call returns the resulting actions: see [`Next`].
 #[derive(Debug)]
 pub struct Protocol {
     pub(crate) device: canopen::device!(NodeApplication, room: ROOM),
-    /// As last published: most samples change nothing.
+    /// The faults shown by the last snapshot: most samples change none.
     pub(crate) shown: Shown,
-    /// The job of the last `Action::Store`.
+    /// The job of the last `Action::Store`, until it is taken.
     pub(crate) job: Option<Job>,
-    /// Samples that may still come from before the parameters that hold now.
+    /// Number of samples that may still have been taken with older parameters.
     pub(crate) older_samples: u8,
 }
 
 impl Protocol {
-    /// A node that has not started: it is silent and hears nothing until `start`.
+    /// A node that has not started: it neither sends nor receives until `start`.
     #[must_use]
     pub fn new(setup: &Setup) -> Protocol {
         let dictionary = setup.personality.dictionary();
@@ -35,16 +36,16 @@ impl Protocol {
         Protocol { device, shown: Shown::default(), job: None, older_samples: 0 }
     }
 
-    /// Initialises what the pending reset covers, then boots up. To be called once the bus is ready,
-    /// and again for `Action::ResetCommunication`.
+    /// Initialises the values that the pending reset covers, then boots up. To be called once the bus is ready, and
+    /// again for `Action::ResetCommunication`.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let next = self.device.start(now, out);
-        // The error register is known only now.
+        // The error register is not known before the start.
         self.device.show(|application, image| application.show_flags(image));
         self.note(next)
     }
 
-    /// Keeps the job that is to be done, for `take_job`, and takes note of new parameters.
+    /// Keeps the job for `take_job`, and takes note of new parameters.
     pub(crate) fn note(&mut self, next: Next) -> Next {
         if next.parameters {
             self.older_samples = OLDER_SAMPLES;
@@ -55,7 +56,7 @@ impl Protocol {
         next
     }
 
-    /// The node-ID in use; `None` while it waits for LSS to give it one.
+    /// The node-ID in use; `None` while the node waits for LSS to assign one.
     #[must_use]
     pub fn node_id(&self) -> Option<NodeId> {
         self.device.node_id()
@@ -67,7 +68,7 @@ impl Protocol {
         self.device.state()
     }
 
-    /// Whether the node does what it is for: it has said its boot-up message, and values were measured.
+    /// Whether the node works: it has sent its boot-up message, and values were measured.
     #[must_use]
     pub fn is_at_work(&self) -> bool {
         self.state() != State::Initialising && self.device.application().has_measured()
@@ -80,21 +81,21 @@ impl Protocol {
         self.note(next)
     }
 
-    /// A frame of FIFO 1: everything else.
+    /// A frame of FIFO 1: any other frame.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.note_master(frame);
         let next = self.device.on_service_frame(frame, now, out);
         self.note(next)
     }
 
-    /// The place of the values of the last millisecond, for [`publish`](Protocol::publish): who measures writes them
-    /// there, or copies them once.
+    /// The snapshot of the last millisecond, for [`publish`](Protocol::publish): the measurement writes its values
+    /// here, or they are copied once.
     pub fn snapshot_mut(&mut self) -> &mut Snapshot {
         &mut self.device.application_mut().snapshot
     }
 
-    /// Takes the values of the last millisecond into the dictionary and sends what their change triggers, and what is due
-    /// of process data. Before the measurement has parameters there are none.
+    /// Copies the values of the last millisecond into the dictionary, and sends the PDOs that their change triggers and
+    /// the process data that is due. Without a snapshot only due process data is sent.
     pub fn publish(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let snapshot = &self.device.application().snapshot;
         if matches!(snapshot, Snapshot::Nothing) {
@@ -108,24 +109,24 @@ impl Protocol {
         self.device.publish(now, out, NodeApplication::show_values)
     }
 
-    /// Does what is due of PDO and SYNC timers.
+    /// Handles expired PDO and SYNC timers.
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         self.device.poll_process(now, out)
     }
 
-    /// Does what is due of heartbeat, SDO and EMCY.
+    /// Handles expired heartbeat, SDO and EMCY timers.
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let next = self.device.poll_services(now, out);
         self.note(next)
     }
 
-    /// The parameters for `Measurement::apply`: new ones when [`Next::parameters`] says so.
+    /// The parameters for `Measurement::apply`; [`Next::parameters`] tells when they have changed.
     #[must_use]
     pub fn parameters(&self) -> Parameters {
         self.device.application().profile.parameters(self.device.image())
     }
 
-    /// The outputs of the board. To be asked for after each frame.
+    /// The outputs of the board. To be called after each frame.
     #[must_use]
     pub fn outputs(&self) -> Outputs {
         self.device.application().profile.outputs(self.device.image())
@@ -136,7 +137,7 @@ impl Protocol {
         self.device.process_ids().map(CanId::get)
     }
 
-    /// The identifiers as acceptance filters: each with a mask of the bits to compare.
+    /// The identifiers for FIFO 0 as acceptance filters: each with a mask of the bits to compare.
     pub fn process_filters(&self) -> impl Iterator<Item = (u16, u16)> {
         self.device.process_filters().map(|(id, mask)| (id.get(), mask))
     }

@@ -1,4 +1,4 @@
-//! A job for the parameter store, with a copy of the values, so that nothing is locked while they are written.
+//! A job for the parameter store, with a copy of the values, so that nothing is locked during the write.
 
 use canopen::dictionary::{Group, Groups};
 use canopen::sdo::Abort;
@@ -8,11 +8,11 @@ use heapless::Vec;
 use profiles::{IMAGE_SIZE, Personality};
 use storage::{Change, DeviceRecord, Error, Store};
 
-use crate::lasting;
 use crate::packed::{PackedGroups, record_of};
+use crate::position_record;
 use crate::stored::{layout, layout_of};
 
-/// A job for the parameter store and all it needs. One is enough: there is one job at a time.
+/// A job for the parameter store with all its data. One is enough, because there is one job at a time.
 #[derive(Debug)]
 pub struct StoreJob {
     pub(crate) job: Option<Job>,
@@ -20,14 +20,14 @@ pub struct StoreJob {
     pub(crate) node_id: Option<NodeId>,
     /// The values of all objects.
     pub(crate) image: [u8; IMAGE_SIZE],
-    /// The device record, where node-ID, bit rate or personality are stored.
+    /// The device record, for a job that stores node-ID, bit rate or personality.
     pub(crate) device: [u8; DeviceRecord::LEN],
-    /// The groups that are stored.
+    /// The packed groups to be stored.
     pub(crate) packed: PackedGroups,
 }
 
 impl StoreJob {
-    /// An empty one, for a node of this personality. A constant of its size would lie in flash.
+    /// An empty job for a node of this personality. Not a constant, because a constant of this size would be in flash.
     #[must_use]
     pub fn new(personality: Personality) -> StoreJob {
         StoreJob {
@@ -40,15 +40,15 @@ impl StoreJob {
         }
     }
 
-    /// Does the job: all of it or nothing. It takes as long as the flash does, some 16 us a word.
+    /// Does the whole job or nothing. The time depends on the flash: some 16 us a word.
     ///
     /// # Errors
-    /// The abort code for the client: `Hardware` when the flash has failed, `DeviceState` when there is no room left until the
-    /// node is restarted.
+    /// The abort code for the client: `Hardware` if the flash has failed, `DeviceState` if there is no room left until
+    /// the node is restarted.
     pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
         self.pack();
         if let Some(Job::Configure(_) | Job::Setting(_)) = self.job {
-            return lasting::replace_device(self.device, store).map_err(|error| abort_of(&error));
+            return position_record::replace_device(self.device, store).map_err(|error| abort_of(&error));
         }
         let changes = match self.job {
             None | Some(Job::Configure(_) | Job::Setting(_)) => Vec::new(),
@@ -58,7 +58,7 @@ impl StoreJob {
         store.save(&changes).map_err(|error| abort_of(&error))
     }
 
-    /// Packs what is stored; of what is restored there is nothing to pack.
+    /// Packs the groups to be stored; a restore has nothing to pack.
     fn pack(&mut self) {
         self.packed.clear();
         let Some(Job::Store(groups)) = self.job else { return };

@@ -1,5 +1,5 @@
-//! What the parameter store holds of the dictionary, kept in RAM for the resets to come: reset communication must not
-//! wait for the flash.
+//! A copy of the stored dictionary values in RAM for later resets, because reset communication must not wait for the
+//! flash.
 
 use canopen::Soundness;
 use canopen::dictionary::{Group, Groups};
@@ -9,28 +9,27 @@ use storage::{Health, View};
 
 use crate::packed::{PackedGroups, record_of};
 
-/// Version of the packed form (`canopen::dictionary`). The form says itself which objects it holds, so a dictionary
+/// Version of the packed form (`canopen::dictionary`). The form itself lists the objects that it holds, so a dictionary
 /// that grows needs no new version.
 const FORM: u8 = 1;
 
-/// The version under which a group is stored: the form in the low byte, and in the high byte the personality whose
-/// dictionary it fits.
+/// The version under which a group is stored: the form in the low byte, the personality in the high byte.
 pub(crate) fn layout(personality: Personality) -> u16 {
     u16::from_le_bytes([FORM, personality.number()])
 }
 
-/// The version of one group. The calibration is that of the device, whatever its personality.
+/// The version of one group. The calibration belongs to the device, whatever the personality.
 pub(crate) fn layout_of(group: Group, layout: u16) -> u16 {
     if group == Group::Calibration { FORM.into() } else { layout }
 }
 
-/// The values that are stored, and how far they can be trusted.
+/// The stored values, and how far they can be trusted.
 #[derive(Debug)]
 pub(crate) struct Stored {
     packed: PackedGroups,
-    /// The groups of which nothing can be read.
+    /// The groups that cannot be read at all.
     lost: Groups,
-    /// The groups of which what was stored last cannot be read.
+    /// The groups whose last stored values cannot be read, so older ones are in use.
     older: Groups,
 }
 
@@ -38,7 +37,7 @@ impl Stored {
     pub(crate) const NOTHING: Stored =
         Stored { packed: PackedGroups::EMPTY, lost: Groups::NONE, older: Groups::NONE };
 
-    /// Reads all groups. What cannot be read counts as not stored, and as a fault.
+    /// Reads all groups. A group that cannot be read counts as not stored, and as a fault.
     pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
         for group in Group::ALL {
             let mut is_readable = true;
@@ -53,14 +52,14 @@ impl Stored {
         }
     }
 
-    /// Takes what has just been stored.
+    /// Takes values that have just been stored.
     pub(crate) fn replace(&mut self, group: Group, packed: &[u8]) {
         let fits = self.packed.replace(group, packed);
         self.lost.set(group, !fits);
         self.older.set(group, false);
     }
 
-    /// 1F57h:1 as the running program gives it (CiA 302-3): 0, or in bits 1 to 7 code 3, format or CRC error.
+    /// 1F57h:1 of the running program (CiA 302-3): 0, or code 3 (format or CRC error) in bits 1 to 7.
     pub(crate) fn flash_status(&self) -> u32 {
         if (self.lost, self.older) == (Groups::NONE, Groups::NONE) { 0 } else { 3 << 1 }
     }
@@ -75,11 +74,11 @@ impl Stored {
     }
 }
 
-/// Bytes that are stored of the group; `None` for what is damaged. Nothing stored is good, too.
+/// Number of stored bytes of the group; `None` for a damaged group. A group that was never stored is not damaged.
 fn read<F: ReadNorFlash>(group: Group, layout: u16, view: &mut View<F>, bytes: &mut [u8]) -> Option<usize> {
     match view.load(record_of(group), bytes) {
         Ok(Some(loaded)) if loaded.version == layout => Some(loaded.len).filter(|len| *len > 0),
-        // The values that another personality has stored are not for this one.
+        // Values that another personality has stored do not apply to this one.
         Ok(Some(loaded)) => (loaded.version.to_le_bytes()[0] == FORM).then_some(0),
         Ok(None) => Some(0),
         Err(_) => None,

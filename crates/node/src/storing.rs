@@ -1,4 +1,4 @@
-//! The protocol's side of the parameter store: what is copied for it, and what is taken over when it is done.
+//! The protocol's side of the parameter store: the copy for a job, and the results of a job.
 
 use canopen::dictionary::Group;
 use canopen::sdo::Abort;
@@ -11,8 +11,8 @@ use crate::stored::layout;
 use crate::{Next, Protocol, StoreJob};
 
 impl Protocol {
-    /// Reads the stored parameters, for [`start`](Protocol::start) and every reset after it. Gives the parameters of the
-    /// measurement: one that has them before the start has a sample for the first PDO.
+    /// Reads the stored parameters, for [`start`](Protocol::start) and every later reset. Returns the parameters of the
+    /// measurement: with them before the start, there is a sample for the first PDO.
     pub fn load<F: ReadNorFlash>(&mut self, view: &mut View<F>) -> Parameters {
         let application = self.device.application_mut();
         application.stored.load(layout(application.setup.personality), view);
@@ -26,17 +26,19 @@ impl Protocol {
         self.parameters()
     }
 
-    /// The device record as it is stored, or would be: what [`LastingRecord`](crate::LastingRecord) writes along.
+    /// The device record, as stored or as it would be stored, which
+    /// [`StoredPositionRecord`](crate::StoredPositionRecord) writes together with its own record.
     #[must_use]
     pub fn device_record(&self) -> [u8; storage::DeviceRecord::LEN] {
         self.device.application().configured.encode()
     }
 
-    /// Takes the job that `Action::Store` announced, with the values of this moment. `false` when there is none. The
-    /// values are only copied: to pack them takes half a millisecond, in which nobody should have to wait for the protocol.
+    /// Takes the job that `Action::Store` announced, with the values of this moment. `false` if there is none. The
+    /// values are only copied: packing them takes half a millisecond, and nobody should wait for the protocol that
+    /// long.
     ///
-    /// Values that the measurement finds, such as the offset of a preset, are stored as well. While they may be from before the
-    /// parameters, the job waits: ask again a few milliseconds later.
+    /// Values that the measurement determines, such as the offset of a preset, are stored too. While such values may be
+    /// older than the parameters, the job waits: ask again a few milliseconds later.
     pub fn take_job(&mut self, taken: &mut StoreJob) -> bool {
         let application = self.device.application();
         let is_measured = !matches!(application.snapshot, Snapshot::Nothing);
@@ -58,7 +60,7 @@ impl Protocol {
         true
     }
 
-    /// The job is done or has failed: the next reset finds what is stored now, and the client is answered.
+    /// The job is done or has failed: the next reset finds the values now stored, and the client gets its answer.
     pub fn finish(
         &mut self,
         done: &StoreJob,

@@ -1,13 +1,13 @@
-//! Object 2F00h: a domain of 4 KiB in RAM. What is written to it is read back: for trying out transfers and measuring them.
+//! Object 2F00h: a domain of 4 KiB in RAM that returns the data written to it, for testing and measuring transfers.
 
 use canopen::Part;
 use canopen::sdo::Abort;
 use heapless::Vec;
 
-/// Bytes that it holds.
+/// Capacity in bytes.
 const CAPACITY: usize = 4096;
 
-/// The buffer and how much of it counts. A download that is given up leaves it empty.
+/// The buffer and its content. An aborted download leaves it empty.
 #[derive(Debug)]
 pub(crate) struct TransferBuffer {
     bytes: Vec<u8, CAPACITY>,

@@ -1,4 +1,4 @@
-//! 2002h: the trial of a new program (docs/update.md). The program that ran before comes back unless the new one is confirmed.
+//! 2002h: the trial of a new program (docs/update.md). The previous program comes back unless the new one is confirmed.
 
 use canopen::sdo::Abort;
 use canopen::{CanId, Duration, Frame, Instant};
@@ -9,40 +9,41 @@ use update::{Reason, Refusal, Status, Trial};
 use crate::Protocol;
 use crate::application::NodeApplication;
 
-/// What 2002h:2 takes: "conf" and "back" in ASCII, the first character in the low byte.
+/// Commands of 2002h:2: "conf" and "back" in ASCII, the first character in the low byte.
 const CONFIRM: [u8; 4] = *b"conf";
 const TAKE_BACK: [u8; 4] = *b"back";
 
-/// So long after its start a program is well that is on the bus and measures, and to which a master has spoken.
+/// Time after its start at which a program is confirmed, if it is on the bus, measures, and has been addressed by a
+/// master.
 const CONFIRMATION: Duration = Duration::from_millis(10_000);
 
-/// So long the answer to a command has to get on the wire.
+/// Time for the answer to a command to be sent.
 const FAREWELL: Duration = Duration::from_millis(20);
 
-/// How a trial ends.
+/// Outcome of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The program is well: [`Trial::confirm`].
+    /// The program works: [`Trial::confirm`].
     Confirm,
-    /// The program before is to come back: [`Trial::withdraw`], and a reset.
+    /// The previous program must come back: [`Trial::withdraw`], and a reset.
     TakeBack,
 }
 
-/// The trial as the running program knows it.
+/// The state of the trial in the running program.
 #[derive(Debug, Default)]
 pub(crate) struct ProgramTrial {
     state: Trial,
-    /// A master has spoken to the node.
+    /// A master has addressed the node.
     is_addressed: bool,
     /// The command that a master has written to 2002h:2.
     command: Option<Verdict>,
-    /// When the command is carried out: the answer to the master goes first.
+    /// Time at which the command is carried out, after the answer to the master.
     due: Option<Instant>,
     verdict: Option<Verdict>,
 }
 
 impl ProgramTrial {
-    /// 2002h:1.
+    /// 2002h:1, state.
     fn state(&self) -> u8 {
         match self.state {
             Trial::None => 0,
@@ -52,13 +53,13 @@ impl ProgramTrial {
         }
     }
 
-    /// Why the program before is back, as 1F57h says it; `None` when it is not.
+    /// Why the previous program was restored, in the codes of 1F57h; `None` if it was not.
     pub(crate) fn flash_status(&self) -> Option<u32> {
         let Trial::Over(reason) = self.state else { return None };
         Some(Status::refused(Refusal::TakenBack { reason }).word())
     }
 
-    /// 2002h:2 is written.
+    /// Handles a write to 2002h:2.
     pub(crate) fn command(&mut self, bytes: &[u8], is_at_work: bool) -> Result<(), Abort> {
         let verdict = match <[u8; 4]>::try_from(bytes) {
             Ok(CONFIRM) if is_at_work => Verdict::Confirm,
@@ -75,25 +76,26 @@ impl ProgramTrial {
 }
 
 impl Protocol {
-    /// How the trial of this program stands. To be called before the start.
+    /// Takes the state of this program's trial. To be called before the start.
     pub fn set_trial(&mut self, trial: Trial) {
         self.device.application_mut().trial.state = trial;
     }
 
-    /// Whether the program may still be taken back. What is stored must be what the program before has stored: it finds its settings.
+    /// Whether the program is still on trial. Until then stored data must stay as the previous program has stored it,
+    /// so that it finds its settings.
     #[must_use]
     pub fn is_on_trial(&self) -> bool {
         self.device.application().trial.state == Trial::Open
     }
 
-    /// Why the program before is back, for the bus.
+    /// Whether the previous program was restored, for a fault on the bus.
     #[must_use]
     pub fn is_taken_back(&self) -> bool {
         matches!(self.device.application().trial.state, Trial::Over(_))
     }
 
-    /// Notes that a master has spoken: with an NMT command, a request to the SDO server, or a heartbeat that is monitored. Frames for
-    /// others do not come here.
+    /// Takes note of a frame from a master: an NMT command, a request to the SDO server, or a monitored heartbeat.
+    /// Frames for other nodes do not arrive here.
     pub(crate) fn note_master(&mut self, frame: &Frame) {
         const FUNCTION: u16 = 0x780;
         let function = frame.id() & FUNCTION;
@@ -102,7 +104,7 @@ impl Protocol {
         }
     }
 
-    /// Looks at the trial, for [`verdict`](Protocol::verdict). `now` counts from the start of the program.
+    /// Judges the trial, for [`verdict`](Protocol::verdict). `now` counts from the start of the program.
     pub fn judge(&mut self, now: Instant, is_on_bus: bool) {
         if self.is_on_trial() {
             let verdict = self.commanded(now).or_else(|| self.found(now, is_on_bus));
@@ -110,13 +112,13 @@ impl Protocol {
         }
     }
 
-    /// How the trial ends now. The verdict stays until it was carried out.
+    /// The outcome of the trial, if decided. It stays until it has been carried out.
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.device.application().trial.verdict
     }
 
-    /// The command of a master, when its answer had time to go.
+    /// The command of a master, once its answer has had time to be sent.
     fn commanded(&mut self, now: Instant) -> Option<Verdict> {
         let trial = &mut self.device.application_mut().trial;
         trial.command?;
@@ -124,7 +126,7 @@ impl Protocol {
         trial.command.filter(|_| now >= due)
     }
 
-    /// The verdict without a command: by the state of the node and the times of 2002h.
+    /// The verdict without a command: from the state of the node and the times of 2002h.
     fn found(&self, now: Instant, is_on_bus: bool) -> Option<Verdict> {
         let is_well = is_on_bus && self.is_at_work();
         let [limit, automatic] = [3, 4].map(|sub| self.seconds(sub));
@@ -138,13 +140,13 @@ impl Protocol {
         }
     }
 
-    /// The program is confirmed.
+    /// Ends the trial: the program is confirmed.
     pub fn end_trial(&mut self) {
         self.device.application_mut().trial = ProgramTrial::default();
         self.device.show(|application, image| application.show_trial(image));
     }
 
-    /// A time of 2002h; `None` where it is 0.
+    /// A time of 2002h; `None` if it is 0.
     fn seconds(&self, sub: u8) -> Option<Duration> {
         let dictionary = self.device.application().setup.personality.dictionary();
         let entry = dictionary.find(PROGRAM_TRIAL, sub).ok()?;

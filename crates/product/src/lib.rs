@@ -1,10 +1,10 @@
-//! Identity of the product, object 1018h. Firmware, bootloader, data sheets and signed images have it from here; whoever
-//! builds a product of their own changes this file.
+//! Identity of the product, object 1018h, for firmware, bootloader, data sheets and signed images. Change this file to
+//! build a product of your own.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
-/// Vendor-ID, 1018h:1. 0 is no vendor: put the one here that CiA has assigned to you.
+/// Vendor-ID, 1018h:1. 0 means no vendor: insert the vendor-ID that CiA has assigned to you.
 pub const VENDOR_ID: u32 = 0;
 
 /// Revision number, 1018h:3: major in the high word, minor in the low word.
@@ -16,6 +16,6 @@ pub const fn code(personality: u8) -> u32 {
     personality as u32 + 1
 }
 
-/// Product code in the bootloader and in the header of an image. An image has all personalities, so the code belongs to
-/// the board: that of the first personality.
+/// Product code in the bootloader and in the header of an image. An image has all personalities, so this code
+/// identifies the board; it is that of the first personality.
 pub const BOARD: u32 = code(0);

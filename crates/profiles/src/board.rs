@@ -1,30 +1,30 @@
-//! What the board gives to the profiles and takes from them, as plain values. Every profile sees the same board; which of
-//! its inputs are used is a matter of the profile and its parameters.
+//! Plain values that the board and the profiles exchange. Every profile sees the same board; the profile and its
+//! parameters decide which inputs are used.
 
 /// Digital inputs of the board: its buttons.
 pub const DIGITAL_INPUTS: usize = 2;
 /// Digital outputs of the board: its lamps.
 pub const DIGITAL_OUTPUTS: usize = 2;
-/// Words that a battery keeps through a loss of power.
+/// Number of words that the battery retains through a loss of power.
 pub const RETAINED_WORDS: usize = 10;
-/// Words that the parameter store holds of them.
-pub const LASTING_WORDS: usize = 2;
+/// Number of words in the record that the parameter store holds about the retained words.
+pub const POSITION_RECORD_WORDS: usize = 2;
 
-/// Everything that was read in one millisecond.
+/// All readings of one millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inputs {
     /// Analogue inputs.
     pub analogue: RawSample,
     /// Inputs of position sensors.
     pub position: RawEncoder,
-    /// Digital inputs, debounced: `true` for a button that is pressed.
+    /// Digital inputs, debounced: `true` for a pressed button.
     pub digital: [bool; DIGITAL_INPUTS],
 }
 
-/// What a profile wants the board to show.
+/// Outputs of a profile to the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outputs {
-    /// Digital outputs: `true` for a lamp that is lit.
+    /// Digital outputs: `true` for a lit lamp.
     pub digital: [bool; DIGITAL_OUTPUTS],
 }
 
@@ -39,7 +39,7 @@ pub struct RawSample {
     pub temperature: u32,
     /// Voltage reference in the chip.
     pub reference: u32,
-    /// Thermistor, with its resistor to the converter's supply; 0 where there is none.
+    /// Thermistor, with its resistor to the converter's supply; 0 if there is none.
     pub thermistor: u32,
     /// Conversions in each sum, at least 1.
     pub count: u16,
@@ -56,60 +56,60 @@ impl RawSample {
         if self.supply == 0 { 0.0 } else { self.pressure as f32 / self.supply as f32 }
     }
 
-    /// Whether every conversion of a sum was at an end of the converter's range.
+    /// Whether every conversion in a sum was at an end of the converter's range.
     #[must_use]
     pub fn is_rail(&self, sum: u32) -> bool {
         sum == 0 || sum >= FULL_SCALE * u32::from(self.count)
     }
 }
 
-/// Characteristic of the temperature sensor in the chip: `T = offset + slope * temperature / reference`, in K, with the sums
-/// of [`RawSample`]. The board knows both numbers from the maker of the chip.
+/// Characteristic of the temperature sensor in the chip: `T = offset + slope * temperature / reference`, in K, with the
+/// sums of [`RawSample`]. The board takes both numbers from the data of the chip's manufacturer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChipThermometer {
-    /// In K.
+    /// Offset in K.
     pub offset: f32,
-    /// In K.
+    /// Slope in K.
     pub slope: f32,
 }
 
 impl ChipThermometer {
-    /// No characteristic is known: nothing is measured.
+    /// No characteristic is known, so no temperature can be measured.
     pub const UNKNOWN: ChipThermometer = ChipThermometer { offset: f32::NAN, slope: f32::NAN };
 }
 
-/// What was read of the position sensors. There is one input of each kind: channels of the same kind share it.
+/// Readings of the position sensors. There is one input of each kind, and channels of the same kind share it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RawEncoder {
     /// Timer in encoder mode: all quarter periods, modulo 2^16.
     pub counter: u16,
-    /// What the timer stood at when the last index pulse came; `None` when none came since the last sample.
+    /// Counter value at the last index pulse; `None` if there was no pulse since the last sample.
     pub index: Option<u16>,
     /// SSI frame, `None` when none was read.
     pub ssi: Option<SsiFrame>,
-    /// More than a millisecond may have passed since the last sample, or an index have come that nobody saw.
+    /// More than a millisecond may have passed since the last sample, or an index may have been missed.
     pub has_gap: bool,
     /// The board around the sensors.
     pub board: Board,
 }
 
-/// What was clocked in from an absolute encoder with synchronous serial interface.
+/// Bits clocked in from an absolute encoder with synchronous serial interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SsiFrame {
     /// The bits, the last one in bit 0.
     pub bits: u64,
-    /// How many, from the rest level on: at least two more than the word has.
+    /// Number of bits, from the rest level on: at least two more than the word has.
     pub clocks: u32,
 }
 
-/// What the board knows besides positions; `None` where it does not measure.
+/// Measurements and findings of the board besides positions; `None` for a value that the board does not measure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Board {
     /// Supply of the sensors in mV.
     pub supply: Option<u16>,
     /// Current of the sensors in mA.
     pub current: Option<u16>,
-    /// Battery behind what outlives a loss of power, in mV.
+    /// Voltage of the battery that supplies the retained memory, in mV.
     pub battery: Option<u16>,
     /// The last reset came from the watchdog.
     pub watchdog_reset: bool,
@@ -117,31 +117,31 @@ pub struct Board {
     pub memory_error: bool,
 }
 
-/// How the board has to read the position sensors.
+/// Settings of the board's position inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PositionInputs {
-    /// Whether they are used at all.
+    /// Whether the position inputs are used.
     pub are_used: bool,
-    /// Bits of the word to be read over SSI; `None` when no sensor has one.
+    /// Bits of the word to be read over SSI; `None` if no sensor uses SSI.
     pub ssi_bits: Option<u32>,
 }
 
-/// What the board knows when the power comes.
+/// State of the board at power-on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerOn {
     /// Characteristic of the chip's temperature sensor.
     pub thermometer: ChipThermometer,
-    /// What has outlived the loss of power.
+    /// The state that the battery has kept while the main supply was off.
     pub retained: Retained,
-    /// What the parameter store holds of what is retained; `None` on a board that has never been started.
-    pub stored: Option<[u32; LASTING_WORDS]>,
-    /// The main supply was gone, and the battery has not kept the memory: the battery is empty or missing, or the board is new.
-    /// `false` also where the main supply was never gone, so that nothing can be said of the battery.
+    /// The record in the parameter store about the retained state; `None` on a board that has never been started.
+    pub stored: Option<[u32; POSITION_RECORD_WORDS]>,
+    /// The main supply was off, and the battery has not kept the memory: the battery is empty or missing, or the board
+    /// is new. `false` also if the main supply was never off, because then the battery was not needed.
     pub battery_failed: bool,
 }
 
 impl Default for PowerOn {
-    /// A new board, whose chip has no calibration.
+    /// A new board whose chip has no calibration.
     fn default() -> PowerOn {
         PowerOn {
             thermometer: ChipThermometer::UNKNOWN,
@@ -152,14 +152,14 @@ impl Default for PowerOn {
     }
 }
 
-/// What the memory that a battery keeps had when the power came back.
+/// Content of the battery-backed memory when the power came back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Retained {
-    /// Nothing yet: the first start.
+    /// Empty: the first start, or an empty battery.
     #[default]
     Nothing,
-    /// The words that a profile gave before.
+    /// The words that the profile wrote last.
     Words([u32; RETAINED_WORDS]),
-    /// Words that are no longer right.
+    /// Damaged words.
     Damaged,
 }

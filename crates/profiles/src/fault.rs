@@ -1,24 +1,24 @@
-//! Faults that a profile finds, as the bus sees them.
+//! Faults that a profile detects, with their appearance on the bus.
 
 use canopen::emcy::Condition;
 
 /// A fault of a profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// Its name, for logs and tests.
+    /// Name for logs and tests.
     pub name: &'static str,
-    /// Error code, bits of the error register, and detail of its EMCY.
+    /// Error code, bits of the error register, and detail of the EMCY.
     pub condition: Condition,
-    /// Its flag, where a dictionary has flags.
+    /// Flag of the fault, for a dictionary with status flags.
     pub flags: Flags,
 }
 
-/// Faults that are active, a bit for each: what a dictionary with flags shows.
+/// Status flags of the active faults, one bit for each, for a dictionary with status flags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags {
-    /// Of the sensors.
+    /// Flags of the sensors.
     pub sensor: u32,
-    /// Of the rest of the device.
+    /// Flags of the rest of the device.
     pub system: u32,
 }
 
@@ -45,7 +45,7 @@ impl Flags {
     }
 }
 
-/// How many faults there are in all lists.
+/// Number of faults in all lists.
 #[must_use]
 pub const fn count(lists: &[&[Fault]]) -> usize {
     let (mut total, mut i) = (0, 0);
@@ -56,10 +56,10 @@ pub const fn count(lists: &[&[Fault]]) -> usize {
     total
 }
 
-/// The faults of all lists. `N` is what [`count`] says.
+/// The faults of all lists. `N` must be the result of [`count`].
 ///
 /// # Panics
-/// During compilation, when `N` is another number.
+/// During compilation, if `N` is another number.
 #[must_use]
 pub const fn gather<const N: usize>(lists: &[&[Fault]]) -> [Fault; N] {
     let mut all = [Fault { name: "", condition: Condition::new(0), flags: Flags::NONE }; N];

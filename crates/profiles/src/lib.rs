@@ -1,7 +1,8 @@
-//! The profiles of the node: what it measures, and what that means on the bus.
+//! The profiles of the node: the measurements, and their objects on the bus.
 //!
-//! A profile is a folder with everything that belongs to it: its rows, its arithmetic, and one implementation of
-//! [`profile::Profile`] and [`profile::Chain`]. This file has the one list of them. No hardware, no clock, no bus.
+//! A profile is a folder with all of its parts: its rows, its arithmetic, and one implementation of
+//! [`profile::Profile`] and [`profile::Chain`]. This file has the only list of the profiles. The crate uses no
+//! hardware, clock or bus.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]

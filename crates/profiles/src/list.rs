@@ -1,19 +1,19 @@
-//! From the list of personalities to the types and tables that have one of each.
+//! Macro that makes the types and tables of a node from its list of personalities.
 
-/// The personalities of a node, in the order of their numbers: a name, the module of its profile, the name of its data
-/// sheet, and what it is. The module has `ROWS`, `FAULTS`, `Objects`, `fields` and `handles`, as
-/// [`pressure`](crate::pressure) has.
+/// The personalities of a node, in the order of their numbers: a name, the module of the profile, the name of the data
+/// sheet, and a description. The module has `ROWS`, `FAULTS`, `Objects`, `fields` and `handles`, as in
+/// [`pressure`](crate::pressure).
 ///
-/// The list makes `Personality`, which selects and nothing else, and the types that hold one of each kind: `AnyProfile`
-/// (the protocol half), `Measurement` (the sampling half), and `Parameters` and `Snapshot`, which travel between both. They
-/// are enums, so nothing is allocated, and no function is called through a pointer.
+/// The list makes `Personality`, which only selects, and the types that hold the variant of the selected personality:
+/// `AnyProfile` (the protocol half), `Measurement` (the sampling half), and `Parameters` and `Snapshot`, which both
+/// halves exchange. All are enums, so nothing is allocated and no function is called through a pointer.
 #[macro_export]
 macro_rules! personalities {
     ($($Name:ident => $module:ident, $file:literal, $description:literal;)+) => {
-        /// How many personalities there are.
+        /// Number of personalities.
         const COUNT: usize = [$($file),+].len();
 
-        /// Which device the node is: its dictionary, its default parameters and its profile.
+        /// Kind of device that the node is: selects the dictionary, the default parameters and the profile.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum Personality {
@@ -21,22 +21,22 @@ macro_rules! personalities {
         }
 
         impl Personality {
-            /// All of them, in the order of their numbers.
+            /// All personalities, in the order of their numbers.
             pub const ALL: [Personality; COUNT] = [$(Personality::$Name),+];
 
-            /// The personality of a number in the device record; `None` for one that this image does not have.
+            /// The personality with this number in the device record; `None` if this image does not have it.
             #[must_use]
             pub fn numbered(number: u8) -> Option<Personality> {
                 Personality::ALL.get(usize::from(number)).copied()
             }
 
-            /// Its number in the device record and in object 2000h.
+            /// The number in the device record and in object 2000h.
             #[must_use]
             pub const fn number(self) -> u8 {
                 self as u8
             }
 
-            /// Its table, sorted: everything there is to say about every object. For the host; the node has
+            /// The table of all objects with all their properties, sorted. For the host; the node uses
             /// [`dictionary`](Personality::dictionary).
             #[must_use]
             pub const fn rows(self) -> &'static [canopen::dictionary::Object] {
@@ -45,7 +45,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// Its dictionary.
+            /// The dictionary.
             #[must_use]
             pub const fn dictionary(self) -> &'static canopen::dictionary::Dictionary {
                 match self {
@@ -53,7 +53,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// Whether its dictionary has objects of this storage group.
+            /// Whether the dictionary has objects of this storage group.
             #[must_use]
             pub const fn has_group(self, group: canopen::dictionary::Group) -> bool {
                 match self {
@@ -61,7 +61,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// File name of its data sheet.
+            /// File name of the data sheet.
             #[must_use]
             pub const fn file_name(self) -> &'static str {
                 match self {
@@ -69,7 +69,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// What it is, in one line.
+            /// Description in one line.
             #[must_use]
             pub const fn description(self) -> &'static str {
                 match self {
@@ -96,13 +96,14 @@ macro_rules! personalities {
                 const PARTS: &[&[&[Object]]] = &[$crate::communication::COMMON, &[&[PERSONALITY]], own::ROWS];
                 pub(crate) static ROWS: [Object; $crate::table::count(PARTS)] = $crate::table::merged(PARTS);
 
-                /// The storage groups of which the table has rows, a bit for each.
+                /// The storage groups that the table has rows of, one bit for each.
                 pub(crate) const GROUPS: u8 = $crate::table::groups(&ROWS);
 
                 pub(crate) static FIELDS: <own::Objects as $crate::profile::Profile>::Fields =
                     own::fields(list::Personality::$Name.dictionary());
 
-                // A row that neither its profile nor the node handles, or a rule without a row, does not compile.
+                // Does not compile if a row marked as handled has no rule in its profile or in the node, or if a rule
+                // has no such row.
                 const _: () = {
                     let mut i = 0;
                     while i < ROWS.len() {
@@ -116,11 +117,11 @@ macro_rules! personalities {
             })+
         }
 
-        /// All dictionaries, compiled together: what they have in common is in the image once.
+        /// All dictionaries, compiled together, so that common parts are in the image once.
         static DICTIONARIES: [canopen::dictionary::Dictionary; COUNT] =
             canopen::dictionaries!([$(&tables::$module::ROWS),+]);
 
-        /// The room of a device, enough for every personality.
+        /// Sizes of a device, large enough for every personality.
         #[allow(long_running_const_eval)]
         pub const ROOM: canopen::dictionary::Sizes =
             canopen::dictionary::Sizes::of_any(&[$(&tables::$module::ROWS),+]);
@@ -139,20 +140,20 @@ macro_rules! personalities {
             size
         }
 
-        /// All faults that the profiles can find.
+        /// All faults that the profiles detect.
         pub static FAULTS: [$crate::fault::Fault; $crate::fault::count(&[$($module::FAULTS),+])] =
             $crate::fault::gather(&[$($module::FAULTS),+]);
 
         /// All parameters of the measurement, as one consistent set.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        #[allow(clippy::large_enum_variant)] // There is one of them.
+        #[allow(clippy::large_enum_variant)] // A node has a single value of this type.
         pub enum Parameters {
             $(#[doc = concat!($description, ".")]
             $Name($crate::profile::Parameters<$module::Objects>),)+
         }
 
         impl Parameters {
-            /// How the board has to read the position sensors.
+            /// Settings of the board's position inputs.
             #[must_use]
             pub fn position_inputs(&self) -> $crate::board::PositionInputs {
                 match self {
@@ -166,9 +167,9 @@ macro_rules! personalities {
 
         /// All measured values of one millisecond, as one consistent set.
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
-        #[allow(clippy::large_enum_variant)] // There is one of them.
+        #[allow(clippy::large_enum_variant)] // A node has a single value of this type.
         pub enum Snapshot {
-            /// Nothing is measured yet.
+            /// Nothing has been measured yet.
             #[default]
             Nothing,
             $(#[doc = concat!($description, ".")]
@@ -176,8 +177,8 @@ macro_rules! personalities {
         }
 
         impl Snapshot {
-            /// Calls `each` with every fault that the profile can find, always in the same order, and whether the
-            /// values show it.
+            /// Calls `each` with every fault that the profile detects, always in the same order, and whether the values
+            /// show the fault.
             pub fn faults(&self, each: &mut impl FnMut(&'static $crate::fault::Fault, bool)) {
                 match self {
                     Snapshot::Nothing => {}
@@ -190,7 +191,7 @@ macro_rules! personalities {
 
         /// The chain of a personality.
         #[derive(Clone, Debug)]
-        #[allow(clippy::large_enum_variant)] // There is one of them.
+        #[allow(clippy::large_enum_variant)] // A node has a single value of this type.
         enum AnyChain {
             $($Name(<$module::Objects as $crate::profile::Profile>::Chain),)+
         }
@@ -199,7 +200,7 @@ macro_rules! personalities {
         #[derive(Clone, Debug)]
         pub struct Measurement {
             chain: AnyChain,
-            /// Before there are parameters, nothing is measured.
+            /// Nothing is measured before the first parameters.
             has_parameters: bool,
         }
 
@@ -213,7 +214,7 @@ macro_rules! personalities {
                 Measurement { chain, has_parameters: false }
             }
 
-            /// Takes over new parameters of its personality, from the next sample on.
+            /// Takes over new parameters of the personality; they act from the next sample on.
             pub fn apply(&mut self, parameters: &Parameters) {
                 self.has_parameters = true;
                 match (&mut self.chain, parameters) {
@@ -225,15 +226,15 @@ macro_rules! personalities {
                 }
             }
 
-            /// Processes what was read in one millisecond.
+            /// Processes the readings of one millisecond.
             pub fn sample(&mut self, inputs: &$crate::board::Inputs) -> Snapshot {
                 let mut snapshot = Snapshot::default();
                 self.update(inputs, &mut snapshot);
                 snapshot
             }
 
-            /// The same, with the snapshot where it is to be: `snapshot` is the last one. Not inlined: this crate is
-            /// compiled for speed, its callers for size.
+            /// Like `sample`, but replaces the last snapshot in its place. Not inlined: this crate is compiled for
+            /// speed, its callers for size.
             #[inline(never)]
             pub fn update(&mut self, inputs: &$crate::board::Inputs, snapshot: &mut Snapshot) {
                 match &mut self.chain {
@@ -249,7 +250,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// Writes what is to outlive a loss of power; `false` while there is nothing.
+            /// Writes the state to be retained through a loss of power; `false` if there is none yet.
             #[inline(never)]
             pub fn retain(&self, words: &mut [u32; $crate::board::RETAINED_WORDS]) -> bool {
                 match &self.chain {
@@ -258,7 +259,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// The same as it is found at the next start.
+            /// The retained state in the form in which the next start finds it.
             #[must_use]
             pub fn retained(&self) -> $crate::board::Retained {
                 let mut words = [0; $crate::board::RETAINED_WORDS];
@@ -312,8 +313,8 @@ macro_rules! personalities {
                 }
             }
 
-            /// As [`Profile::publish`]($crate::profile::Profile::publish); what another personality has measured is
-            /// left alone.
+            /// As [`Profile::publish`]($crate::profile::Profile::publish). A snapshot of another personality is
+            /// ignored.
             pub fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
                 use $crate::profile::Profile;
                 match (self, snapshot) {

@@ -8,11 +8,11 @@ use crate::board::{DIGITAL_OUTPUTS, Inputs, Outputs, PositionInputs, PowerOn, RE
 use crate::fault::{Fault, Flags};
 use crate::profile::{Chain, Parameters, Profile, Snapshot};
 
-/// Two protocol halves, whose objects do not overlap.
+/// Two protocol halves whose objects do not overlap.
 #[derive(Debug)]
 pub struct Pair<A, B>(A, B);
 
-/// The two sampling halves that belong to them.
+/// The two sampling halves of the pair.
 #[derive(Clone, Debug)]
 pub struct ChainPair<A, B>(A, B);
 
@@ -42,7 +42,7 @@ impl<A: Chain, B: Chain> Chain for ChainPair<A, B> {
         }
     }
 
-    /// There is one memory for both: the first that wants it has it.
+    /// The retained memory belongs to the first profile that uses it.
     fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
         self.0.retain(words) || self.1.retain(words)
     }
@@ -139,7 +139,7 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         self.0.broadcasts(at, image) && self.1.broadcasts(at, image)
     }
 
-    /// A digital output is on when one of them wants it on.
+    /// A digital output is on if one of the profiles switches it on.
     fn outputs(&self, image: &[u8]) -> Outputs {
         let (first, second) = (self.0.outputs(image).digital, self.1.outputs(image).digital);
         let mut digital: [bool; DIGITAL_OUTPUTS] = first;

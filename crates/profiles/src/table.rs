@@ -1,11 +1,11 @@
-//! Tables of rows, put together during compilation: every panic here is an error of the compiler.
+//! Tables of rows, combined during compilation: every panic here is a compile error.
 
 use canopen::dictionary::{Access, Object, Rule, Type};
 
-/// The most parts that a table has.
+/// Largest number of parts in a table.
 const PARTS: usize = 40;
 
-/// How many rows the parts have together.
+/// Number of rows in all parts together.
 #[must_use]
 pub const fn count(all: &[&[&[Object]]]) -> usize {
     let (mut total, mut i) = (0, 0);
@@ -20,10 +20,10 @@ pub const fn count(all: &[&[&[Object]]]) -> usize {
     total
 }
 
-/// One table in the order of index and sub-index, from parts that are each in that order. `N` is what [`count`] says.
+/// Merges parts, each sorted by index and sub-index, into one sorted table. `N` must be the result of [`count`].
 ///
 /// # Panics
-/// During compilation, when `N` is another number or there are too many parts.
+/// During compilation, if `N` is another number or there are too many parts.
 #[must_use]
 pub const fn merged<const N: usize>(all: &[&[&[Object]]]) -> [Object; N] {
     let (mut rests, len) = flat(all);
@@ -39,7 +39,7 @@ pub const fn merged<const N: usize>(all: &[&[&[Object]]]) -> [Object; N] {
     rows
 }
 
-/// The parts in one list, and how many there are.
+/// The parts in one list, and their number.
 const fn flat<'a>(all: &[&'a [&'a [Object]]]) -> ([&'a [Object]; PARTS], usize) {
     let (mut parts, mut len, mut i): ([&[Object]; PARTS], usize, usize) = ([&[]; PARTS], 0, 0);
     while i < all.len() {
@@ -84,7 +84,7 @@ pub const fn is_handled(row: &Object) -> bool {
     matches!(row.rule, Rule::Application) && !matches!(row.kind, Type::Domain)
 }
 
-/// The storage groups of which a table has rows, a bit for each.
+/// The storage groups that a table has rows of, one bit for each.
 #[must_use]
 pub const fn groups(rows: &[Object]) -> u8 {
     let mut groups = 0;

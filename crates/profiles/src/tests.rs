@@ -1,10 +1,10 @@
-//! The list as a whole.
+//! Tests of the whole list.
 
 use canopen::dictionary::{DefaultValue, Object};
 
 use super::*;
 
-/// Bytes of the default value of a row, as long as its place.
+/// Bytes of a row's default value, `len` bytes long.
 fn default(row: &Object, len: usize) -> Vec<u8> {
     let mut bytes = match row.default {
         DefaultValue::Integer(value) => value.to_le_bytes().to_vec(),
@@ -28,7 +28,7 @@ fn every_row_has_its_entry_and_its_default() {
             assert_eq!((entry.index(), entry.sub()), (row.index, row.sub));
             assert_eq!(entry.field(), dictionary.field(row.index, row.sub));
             let value = entry.field().get(&image);
-            // An error list and the other name of an event timer have no values of their own.
+            // The error list (1003h) and the alias of an event timer (6200h) have no values of their own.
             let has_value = row.index != 0x1003 && row.index != 0x6200;
             assert!(!has_value || value == default(row, value.len()), "{:04X}h:{}", row.index, row.sub);
         }

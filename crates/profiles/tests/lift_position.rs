@@ -1,4 +1,4 @@
-//! Car position units: the way of a car, seen by sensors of each kind.
+//! Car position units: the travel of a car, measured by sensors of each kind.
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
 
 use profiles::board::{RawEncoder, SsiFrame};
@@ -12,7 +12,7 @@ use profiles::lift::position::{
 /// Speed of the car in mm/ms.
 const FAST: f64 = 2.5;
 
-/// A car whose way in mm the sensors see.
+/// A car with its sensors; `way` is its travel in mm.
 struct Car {
     units: PositionUnits,
     parameters: Parameters,
@@ -31,7 +31,7 @@ impl Car {
         self.units.apply(&self.parameters);
     }
 
-    /// Lets a millisecond pass in which the car goes this way.
+    /// Moves the car by this distance within a millisecond.
     fn drive(&mut self, millimetres: f64) -> Snapshot {
         self.way += millimetres;
         let steps = self.way / self.step();
@@ -45,7 +45,7 @@ impl Car {
         self.units.sample(&raw)
     }
 
-    /// Way of a native step in mm.
+    /// Travel per native step in mm.
     fn step(&self) -> f64 {
         let sensors = &self.parameters.sensors;
         let sensor = sensors.sensor(&sensors.channels[0]).unwrap();
@@ -55,7 +55,7 @@ impl Car {
         f64::from(self.parameters.travel.get()) * 1e-3 / f64::from(sensor.resolution())
     }
 
-    /// A measuring step in mm.
+    /// Length of a measuring step in mm.
     fn unit(&self) -> f64 {
         f64::from(self.parameters.position_step.get()) / 100.0
     }
@@ -64,7 +64,7 @@ impl Car {
         self.drive(0.0).units[0].position
     }
 
-    /// As node and device do it: the offset is found when the preset is written.
+    /// As in the node: the offset is computed when the preset is written.
     fn preset(&mut self, preset: u32) -> Option<()> {
         let position = self.position();
         self.parameters.units[0].offset = self.parameters.preset(0, position, preset)?;
@@ -73,7 +73,7 @@ impl Car {
     }
 }
 
-/// What an SSI encoder sends for a position: a high level, the code, and a low level to the last clock.
+/// Frame of an SSI encoder: a high level, the code, and a low level up to the last clock.
 fn frame(format: &Format, position: u32) -> SsiFrame {
     let bits = format.position_bits();
     let code = position ^ (position >> 1);
@@ -84,7 +84,7 @@ fn with_sensor(kind: SensorType, resolution: u32) -> Parameters {
     let mut parameters = Parameters::default();
     let [channel, _] = &mut parameters.sensors.channels;
     channel.kind = Some(kind);
-    // The car of some tests is carried through the shaft.
+    // The car of some tests moves in leaps.
     channel.fastest = 10_000;
     channel.resolution = NonZeroU32::new(resolution).unwrap();
     parameters.sensors.index = false;
@@ -93,7 +93,7 @@ fn with_sensor(kind: SensorType, resolution: u32) -> Parameters {
     parameters
 }
 
-/// A pulley of odd size, a multi-turn encoder on it, a tape with 0.1 mm, an absolute tape with 0.0625 mm.
+/// A pulley of odd size, a multi-turn encoder on the pulley, a tape with 0.1 mm, an absolute tape with 0.0625 mm.
 fn sensors() -> [Parameters; 4] {
     let pulley = Parameters {
         travel: NonZeroU32::new(314_159).unwrap(),
@@ -159,7 +159,7 @@ fn a_preset_is_the_position_from_then_on() {
 #[test]
 fn a_preset_beyond_the_sensor_is_none() {
     let mut car = Car::new(with_sensor(SensorType::MultiTurn, 1), 0.0);
-    // 4096 revolutions of 200 mm.
+    // The range: 4096 revolutions of 200 mm.
     assert_eq!(car.preset(4096 * 200), None);
     assert_eq!(car.preset(4096 * 200 - 1), Some(()));
     assert_eq!(car.position(), 4096 * 200 - 1);
@@ -195,7 +195,7 @@ fn units_of_one_sensor_have_their_own_zero_direction_and_limits() {
     parameters.units[2] = second;
     let mut car = Car::new(parameters, 0.0);
     let states = [1600.0, 900.0, 400.0, 1.0].map(|way| {
-        // Ten metres a second: a leap would be a fault of the sensor.
+        // Ten metres a second at most: a leap would be a fault of the sensor.
         while (way - car.way).abs() > 10.0 {
             car.drive((way - car.way).clamp(-10.0, 10.0));
         }
@@ -229,7 +229,7 @@ fn the_status_describes_the_sensor() {
     assert_eq!(car.units.sample(&RawEncoder::default()).units[0].state, UNKNOWN, "it does not answer");
 }
 
-/// The pulley of a counted sensor turns on from where it was left.
+/// The pulley of a counted sensor turns on from its retained position.
 #[test]
 fn the_way_outlives_a_loss_of_power() {
     let [pulley, ..] = sensors();
@@ -237,7 +237,7 @@ fn the_way_outlives_a_loss_of_power() {
     car.preset(10_000).unwrap();
     (0..8000).for_each(|_| _ = car.drive(FAST));
     let before = car.position();
-    car.units = PositionUnits::new(profiles::encoder::Start::Kept(car.units.kept()));
+    car.units = PositionUnits::new(profiles::encoder::Start::Retained(car.units.retained_state()));
     car.apply();
     assert_eq!(car.position(), before);
 }
@@ -253,7 +253,7 @@ fn a_source_is_the_number_of_a_channel() {
     assert_eq!(sources, [None, Some(Source::First), Some(Source::Second), None]);
 }
 
-/// Of the 819 200 positions of 4096 revolutions of 200 mm.
+/// Within the 819 200 positions of 4096 revolutions of 200 mm.
 #[test]
 fn the_offset_is_the_one_nearest_to_zero() {
     let parameters = with_sensor(SensorType::MultiTurn, 1);
@@ -281,7 +281,7 @@ fn the_range_is_what_the_electronic_count_tells_apart() {
 
 #[test]
 fn what_is_set_for_an_encoder_of_cia_406_does_not_count() {
-    // The second does not resolve the step of 1 mm.
+    // The second sensor does not resolve the step of 1 mm.
     for resolution in [4096, 199] {
         let plain = with_sensor(SensorType::IncrementalCounted, resolution);
         let mut other = plain;
@@ -302,7 +302,7 @@ fn a_car_that_is_faster_than_its_sensor_is_a_warning() {
         let mut parameters = with_sensor(SensorType::IncrementalCounted, 4096);
         parameters.sensors.channels[0].fastest = fastest;
         let mut car = Car::new(parameters, 0.0);
-        // 51.2 steps.
+        // The car travels 51.2 steps in a millisecond.
         assert_eq!(car.drive(FAST).units[0].warnings, warnings);
     }
 }

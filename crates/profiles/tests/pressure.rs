@@ -1,5 +1,5 @@
-//! Whatever finite parameters and whatever readings: nothing but finite numbers leaves the transmitter, and the order of
-//! pressures is kept.
+//! Any finite parameters and any readings: the transmitter gives finite numbers only, and the order of pressures is
+//! preserved.
 
 use profiles::board::{ChipThermometer, RawSample};
 use profiles::pressure::{
@@ -21,7 +21,7 @@ fn repeatable() -> ProptestConfig {
     }
 }
 
-/// Any finite number: of any bits, or a usual one, or an end of the range.
+/// Any finite number: random bits, a usual value, or an end of the range.
 fn real() -> impl Strategy<Value = f32> {
     let bits = any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |value| value.is_finite());
     prop_oneof![bits, -1e6_f32..1e6, select(vec![0.0, 1.0, f32::MIN, f32::MAX, f32::MIN_POSITIVE])]
@@ -93,7 +93,7 @@ fn is_finite(values: &ChannelValues) -> bool {
     values.field_value.is_finite() && values.process_value.is_finite()
 }
 
-/// Of a transducer with a strong drift; few of those above are valid.
+/// Polynomials of a transducer with a strong drift; few arbitrary polynomials are valid.
 fn rising() -> impl Strategy<Value = Polynomial> {
     (0.1_f32..2.0, -5e-4_f32..5e-4, 0.0_f32..1e-6).prop_map(|(constant, linear, quadratic)| Polynomial {
         constant,

@@ -1,4 +1,5 @@
-//! The value of [`Group::Device`](crate::Group::Device): what a node must know before it can go on the bus.
+//! The value of [`ParameterGroup::Device`](crate::ParameterGroup::Device): the data that a node needs before it can go
+//! on the bus.
 
 /// Node-ID, bit rate and personality. A value of this type is always valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +14,7 @@ impl DeviceRecord {
     pub const VERSION: u16 = 1;
     /// Length of the stored record in bytes.
     pub const LEN: usize = 4;
-    /// Bytes that the value has at most: behind the record may be what else a device keeps of its own life.
+    /// Largest size of the value in bytes: other facts of the device may follow the record.
     pub const ROOM: usize = 16;
     /// The node-ID of a device that has none yet (CiA 305: LSS must assign one).
     pub const UNCONFIGURED: u8 = 255;
@@ -22,9 +23,9 @@ impl DeviceRecord {
     /// The bit rates of CiA 301 in kbit/s.
     pub const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
-    /// A record of a node-ID (1..=127, or 255 for unconfigured), a bit rate in kbit/s (one of
-    /// [`Self::BIT_RATES`], or 0 for automatic detection) and the number of a personality, which the
-    /// dictionary gives its meaning. `None` when one of the first two is out of range.
+    /// A record of a node-ID (1..=127, or 255 for unconfigured), a bit rate in kbit/s (one of [`Self::BIT_RATES`], or 0
+    /// for automatic detection), and the number of a personality, whose meaning is defined by the dictionary. `None` if
+    /// node-ID or bit rate is out of range.
     #[must_use]
     pub fn new(node_id: u8, bit_rate_kbit: u16, personality: u8) -> Option<DeviceRecord> {
         let node_id_fits = matches!(node_id, 1..=127 | Self::UNCONFIGURED);
@@ -32,7 +33,7 @@ impl DeviceRecord {
         (node_id_fits && bit_rate_fits).then_some(DeviceRecord { node_id, bit_rate_kbit, personality })
     }
 
-    /// The node-ID, 1..=127, or 255 when unconfigured.
+    /// The node-ID, 1..=127, or 255 if unconfigured.
     #[must_use]
     pub fn node_id(&self) -> u8 {
         self.node_id
@@ -57,7 +58,8 @@ impl DeviceRecord {
         [self.node_id, self.personality, low, high]
     }
 
-    /// The record that begins `bytes` of layout `version`; `None` for another version, too few bytes or a value out of range.
+    /// The record at the start of `bytes` in layout `version`; `None` for another version, too few bytes or a value out
+    /// of range.
     #[must_use]
     pub fn decode(version: u16, bytes: &[u8]) -> Option<DeviceRecord> {
         let (Self::VERSION, &[node_id, personality, low, high, ..]) = (version, bytes) else {

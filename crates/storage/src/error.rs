@@ -2,20 +2,20 @@
 
 use core::fmt;
 
-/// Why the store could not do what was asked. `E` is the error of the flash driver.
+/// Why an operation of the store failed. `E` is the error of the flash driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error<E> {
     /// The flash driver reported an error.
     Flash(E),
-    /// The two pages do not lie within the flash, or their size is none that the store or the flash can use.
+    /// The two pages do not lie within the flash, or the store or the flash cannot use their size.
     Geometry,
     /// The caller's buffer is shorter than the stored value.
     BufferTooSmall,
     /// A value is longer than [`crate::MAX_VALUE`], or all groups together would not fit an empty page.
     TooLong,
-    /// Both pages are used up. Nothing is lost; the next start-up erases one of them, then saving works again.
+    /// Both pages are used up. Nothing is lost; the next start-up erases one of them, and saving works again.
     RestartNeeded,
-    /// The flash does not hold what was read or written before: a worn-out or disturbed cell.
+    /// The flash does not hold the data that was read or written before: a worn-out or disturbed cell.
     Corrupt,
 }
 

@@ -1,31 +1,31 @@
-//! The words of a page; the picture is in the documentation of the crate. All numbers are little-endian.
+//! The words of a page; the documentation of the crate has a picture. All numbers are little-endian.
 
 use checksum::Digest;
 
 use crate::group::GroupSet;
 
-/// A word of the format. The flash may program more at once: see [`Format`].
+/// Bytes of a word of the format. The flash may program more bytes at once: see [`Format`].
 pub(crate) const WORD: u32 = 4;
-/// A word that was not programmed since the page was erased.
+/// A word that has not been programmed since the page was erased.
 pub(crate) const ERASED: u32 = u32::MAX;
-/// The value of a word that says something by being programmed at all. All bits are programmed, so doing it
-/// once more after a cut that left the word half programmed but reading as erased is sound.
+/// The value of a word whose only information is that it was programmed. All bits are programmed. If a power cut has
+/// left the word half programmed but reading as erased, it may therefore be programmed once more.
 pub(crate) const MARK: u32 = 0;
-/// First word of a page whose erase has run to its end; the digit is the version of this format.
+/// First word of a page whose erase has finished; the digit is the version of this format.
 pub(crate) const CLEAN: u32 = u32::from_le_bytes(*b"PRM2");
-/// The most bytes that a flash may program as one.
+/// The largest unit of programming in bytes.
 pub(crate) const LARGEST_UNIT: u32 = 32;
 
-/// Where things are in a page. What is programmed on its own has a unit of the flash for itself: a flash with check bits
-/// programs a unit once. The words that follow each other fill units; zeros fill what is left of the last one.
+/// The places in a page. A word that is programmed on its own has a unit of the flash for itself, because a flash with
+/// check bits programs a unit only once. Consecutive words share units; the rest of the last unit is filled with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Format {
-    /// Bytes that the flash programs as one: 4, 8, 16 or 32.
+    /// Unit of programming in bytes: 4, 8, 16 or 32.
     pub(crate) unit: u32,
 }
 
 impl Format {
-    /// `None` for a unit that is none.
+    /// `None` for an invalid unit.
     pub(crate) const fn new(unit: u32) -> Option<Format> {
         match unit {
             WORD | 8 | 16 | LARGEST_UNIT => Some(Format { unit }),
@@ -33,37 +33,37 @@ impl Format {
         }
     }
 
-    /// Where the mark of a page is that the store has moved away from.
+    /// The place of the mark that the store has moved away from the page.
     pub(crate) fn left_at(self) -> u32 {
         self.unit
     }
 
-    /// Where the first transaction of a page begins.
+    /// The place of the first transaction of a page.
     pub(crate) fn first(self) -> u32 {
         2 * self.unit
     }
 
-    /// Size of what precedes the records of a transaction: begin mark; contents.
+    /// Size of the part of a transaction before its records: begin mark; contents.
     pub(crate) fn head(self) -> u32 {
         2 * self.unit
     }
 
-    /// Size of what follows the records: commit word, closing mark.
+    /// Size of the part of a transaction after its records: commit word, closing mark.
     pub(crate) fn tail(self) -> u32 {
         2 * self.unit
     }
 
-    /// Size of what precedes the value of a record: group, kind and version; length and generation.
+    /// Size of the part of a record before its value: group, kind and version; length and generation.
     pub(crate) fn record_head(self) -> u32 {
         self.padded(2 * WORD)
     }
 
-    /// Size of a value of `len` bytes and of the check word behind it: whole units.
+    /// Size of a value of `len` bytes with its check word, in whole units.
     pub(crate) fn body(self, len: u32) -> u32 {
         self.padded(in_words(len) + WORD)
     }
 
-    /// Bytes that something takes up: whole units. A unit is a power of two, so there is no division that could be by zero.
+    /// `len` rounded up to whole units. A unit is a power of two, so no division is needed that could be by zero.
     pub(crate) fn padded(self, len: u32) -> u32 {
         let most = self.unit.wrapping_sub(1);
         len.wrapping_add(most) & !most
@@ -74,21 +74,21 @@ impl Format {
 pub(crate) const KIND_VALUE: u8 = 1;
 pub(crate) const KIND_RESTORED: u8 = 2;
 
-/// The bytes of so many whole words that a value of `len` bytes fits.
+/// `len` rounded up to whole words.
 pub(crate) fn in_words(len: u32) -> u32 {
     len.wrapping_add(WORD - 1) & !(WORD - 1)
 }
 
-/// A number beside its complement. A torn word has some zeros of the target missing, in one half or the other, so
-/// it is never another valid number; nor is a word with an odd count of flipped bits.
+/// A number and its complement. A half-programmed word lacks some zeros in one half or the other, so it is never
+/// another valid number; nor is a word with an odd number of flipped bits.
 pub(crate) fn guarded(value: u16) -> u32 {
     u32::from(value) | u32::from(!value) << 16
 }
 
-/// How many bits of [`Contents`] are the number of words: enough for four values of [`crate::MAX_VALUE`].
+/// Number of bits in [`Contents`] for the number of words: enough for four values of [`crate::MAX_VALUE`].
 const WORDS: u32 = 12;
 
-/// Head of a transaction: the number of words of its records, and the groups that they belong to.
+/// Head of a transaction: the number of words of its records, and the groups of the records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Contents {
     pub(crate) words: u16,
@@ -116,11 +116,11 @@ pub(crate) fn unguarded(word: u32) -> Option<u16> {
     (guarded(value) == word).then_some(value)
 }
 
-/// The running check of a transaction or of a record.
+/// The running checksum of a transaction or of a record.
 pub(crate) struct Check(Digest);
 
 impl Check {
-    /// Begins with the place in the page, so that what is found elsewhere, as a copy in a value, is none.
+    /// Begins with the place in the page, so that a copy elsewhere, for example inside a value, is not valid.
     pub(crate) fn new(at: u32) -> Check {
         let mut check = Check(checksum::begin());
         check.add(at);
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn a_commit_word_never_reads_as_erased() {
         let mut check = Check::new(8);
-        // After the word that is what the register holds, the register is 0 and the CRC all ones.
+        // After a word that equals the register, the register is 0 and the CRC is all ones.
         let word = !checksum::of(&8_u32.to_le_bytes());
         check.add(word);
         let bytes = [8_u32.to_le_bytes(), word.to_le_bytes()].concat();

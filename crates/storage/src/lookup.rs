@@ -1,17 +1,18 @@
-//! The device record alone: for a bootloader, which has no room for the rest of the store.
+//! Search for the device record alone, for a bootloader that has no room for the rest of the store.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::device::DeviceRecord;
 use crate::format::WORD;
-use crate::group::Group;
+use crate::group::ParameterGroup;
 use crate::page::{Page, Pages, StoredRecord};
 use crate::view::follows;
 
-/// The device record that was saved last and is intact; `None` where there is none. Other groups are not looked at, and nothing
-/// is said of damage: what a [`View`](crate::View) reads is the same where nothing is damaged.
+/// The device record that was saved last and is intact; `None` without one. Other groups are ignored, and damage is not
+/// reported. Without damage the result is the same as that of a [`View`](crate::View).
 ///
-/// After a cut in a save this may be the new record where the store still reads the old one, until the next start of the store.
+/// After a cut in a save the result may be the new record while the store still reads the old one, until the next start
+/// of the store.
 pub fn device_record<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Option<DeviceRecord> {
     let [first, second] = pages.split::<F::Error>(flash.capacity(), WORD as usize).ok()?;
     let (a, b) = (newest(flash, first), newest(flash, second));
@@ -25,9 +26,10 @@ pub fn device_record<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Option<Dev
     DeviceRecord::decode(record.version, &value)
 }
 
-/// The last record of the device in a page: each record vouches for itself, with its place.
+/// The last device record in a page. The check of each record includes its place, so a record found anywhere can be
+/// trusted.
 fn newest<F: ReadNorFlash>(flash: &mut F, page: Page) -> Option<StoredRecord> {
     let places = (page.format.first()..page.size).step_by(WORD as usize);
     let records = places.filter_map(|at| page.record(flash, at, page.size).ok().flatten());
-    records.filter(|record| record.is_value_of(Group::Device)).last()
+    records.filter(|record| record.is_value_of(ParameterGroup::Device)).last()
 }

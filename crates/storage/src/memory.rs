@@ -1,11 +1,11 @@
-//! A flash in memory: a dump that is only read, or a buffer that is provisioned on the host.
+//! A flash in memory: a read-only dump, or a buffer that is provisioned on the host.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-/// The bytes of a flash from its first address on. A shared slice can be read, `&mut [u8]`, an array or a
-/// `Vec<u8>` can be written as well. Writing clears bits, as in the real thing.
+/// The bytes of a flash from its first address. A shared slice can be read; `&mut [u8]`, an array or a `Vec<u8>` can
+/// also be written. Writing clears bits, as in a real flash.
 #[derive(Clone, Debug)]
 pub struct Memory<T>(
     /// The content.

@@ -1,4 +1,4 @@
-//! A NOR flash for tests: units of one size that are erased, and words of four or eight bytes that are programmed.
+//! A NOR flash for tests: erased in units of one size, and programmed in words of four or eight bytes.
 
 use std::ops::{Deref, DerefMut};
 use std::vec;
@@ -9,7 +9,8 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash, check_erase
 
 pub use cells::{PowerCut, Weak};
 
-/// A flash that is erased in units of `ERASE` bytes and programmed in words of `WORD`. Its [`Cells`] say how the power is cut.
+/// A flash that is erased in units of `ERASE` bytes and programmed in words of `WORD`. Its [`Cells`] define the power
+/// cuts.
 #[derive(Clone, Debug)]
 pub struct MockFlash<const ERASE: usize, const WORD: usize = 4> {
     cells: Cells,
@@ -17,13 +18,13 @@ pub struct MockFlash<const ERASE: usize, const WORD: usize = 4> {
 }
 
 impl<const ERASE: usize, const WORD: usize> MockFlash<ERASE, WORD> {
-    /// An erased flash of `size` bytes. `seed` decides how random weak bits read.
+    /// An erased flash of `size` bytes. `seed` determines how random weak bits read.
     #[must_use]
     pub fn new(size: usize, seed: u64) -> Self {
         MockFlash { cells: Cells::with_words(size, WORD, seed), erases: vec![0; size / ERASE] }
     }
 
-    /// How often each erase unit was erased.
+    /// Number of erases of each erase unit.
     #[must_use]
     pub fn erases(&self) -> &[u32] {
         &self.erases

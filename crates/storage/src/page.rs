@@ -1,12 +1,12 @@
-//! One page as words, and the transactions in it.
+//! One page as words, and its transactions.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, ERASED, Format, KIND_RESTORED, KIND_VALUE, MARK, WORD, in_words};
-use crate::group::{Group, GroupSet};
+use crate::group::{GroupSet, ParameterGroup};
 
-/// Where the two pages of the store lie in the flash. Both are of the same size and adjacent.
+/// The two pages of the store in the flash. Both have the same size and are adjacent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pages {
     start: u32,
@@ -22,19 +22,19 @@ impl Pages {
         Pages { start, size, unit: WORD }
     }
 
-    /// These pages in a flash that programs `bytes` as one: 4, 8, 16 or 32, a multiple of its `WRITE_SIZE`.
+    /// The same pages in a flash that programs `bytes` at once: 4, 8, 16 or 32, a multiple of its `WRITE_SIZE`.
     #[must_use]
     pub const fn with_words(self, bytes: u32) -> Pages {
         Pages { unit: bytes, ..self }
     }
 
-    /// Whether a flash that programs `write_size` bytes as one can take what is written.
+    /// Whether a flash that programs `write_size` bytes at once can program the units of the store.
     pub(crate) fn suits(self, write_size: usize) -> bool {
         usize::try_from(self.unit).is_ok_and(|unit| unit.is_multiple_of(write_size))
     }
 
     /// The two pages, if a flash of `capacity` bytes that is erased in units of `erase_size` can hold them. The store
-    /// takes pages of 64 bytes to 128 KiB, whole units each.
+    /// accepts pages of 64 bytes to 128 KiB, in whole units.
     pub(crate) fn split<E>(self, capacity: usize, erase_size: usize) -> Result<[Page; 2], Error<E>> {
         let Pages { start, size, unit } = self;
         let format = Format::new(unit).ok_or(Error::Geometry)?;
@@ -54,7 +54,7 @@ impl Pages {
     }
 }
 
-/// One page. Places in it are offsets from its beginning.
+/// One page. Places in the page are offsets from its beginning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Page {
     pub(crate) start: u32,
@@ -75,33 +75,33 @@ pub(crate) struct Transaction {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredRecord {
     /// `None` for a group that this version does not know.
-    pub(crate) group: Option<Group>,
+    pub(crate) group: Option<ParameterGroup>,
     pub(crate) kind: u8,
     pub(crate) version: u16,
     pub(crate) generation: u16,
-    /// The first byte of the value.
+    /// The place of the first byte of the value.
     pub(crate) data: u32,
     pub(crate) len: u32,
-    /// Where the next record begins.
+    /// The place of the next record.
     pub(crate) end: u32,
 }
 
 impl StoredRecord {
-    /// Whether it gives the group a value of some bytes.
-    pub(crate) fn is_value_of(&self, group: Group) -> bool {
+    /// Whether the record gives the group a value that is not empty.
+    pub(crate) fn is_value_of(&self, group: ParameterGroup) -> bool {
         self.group == Some(group) && self.kind == KIND_VALUE && self.len > 0
     }
 }
 
 impl Page {
-    #[inline(never)] // Many places, little room.
+    #[inline(never)] // Many callers, and little room in flash.
     pub(crate) fn word<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<u32, F::Error> {
         let mut bytes = [0; WORD as usize];
         flash.read(self.start + at, &mut bytes)?;
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// Fills `buf` from a place on a word boundary.
+    /// Fills `buf` from a place at a word boundary.
     pub(crate) fn bytes<F: ReadNorFlash>(
         self,
         flash: &mut F,
@@ -125,7 +125,7 @@ impl Page {
         Ok(true)
     }
 
-    /// The transaction at `at`, if there is a complete one. The begin mark carries no information and is not looked at.
+    /// The transaction at `at`, if there is a complete one. The begin mark carries no information and is ignored.
     pub(crate) fn transaction<F: ReadNorFlash>(
         self,
         flash: &mut F,
@@ -140,8 +140,8 @@ impl Page {
         Ok(Some(Transaction { at, records_end, end: records_end + self.format.tail(), closed }))
     }
 
-    /// The record at `at`, if there is one that is intact and ends before `limit`. The record vouches for itself, whatever has
-    /// become of the transaction around it.
+    /// The record at `at`, if there is an intact one that ends before `limit`. Its own check is enough, whatever the
+    /// state of the transaction around it.
     pub(crate) fn record<F: ReadNorFlash>(
         self,
         flash: &mut F,
@@ -162,10 +162,18 @@ impl Page {
         }
         let (version, generation) =
             (u16::from_le_bytes([low, high]), u16::from_le_bytes([generation_low, generation_high]));
-        Ok(Some(StoredRecord { group: Group::from_id(id), kind, version, generation, data, len, end }))
+        Ok(Some(StoredRecord {
+            group: ParameterGroup::from_id(id),
+            kind,
+            version,
+            generation,
+            data,
+            len,
+            end,
+        }))
     }
 
-    /// The check word over the words between two places, of what begins at `at`.
+    /// The check word over the words between two places, for a record or transaction that begins at `at`.
     fn check<F: ReadNorFlash>(self, flash: &mut F, at: u32, from: u32, to: u32) -> Result<u32, F::Error> {
         let mut check = Check::new(at);
         for place in (from..to).step_by(WORD as usize) {
@@ -174,7 +182,7 @@ impl Page {
         Ok(check.commit_word())
     }
 
-    /// Whether the transaction whose records end there was written to its end.
+    /// Whether the transaction whose records end at `records_end` has its closing mark.
     pub(crate) fn is_closed<F: ReadNorFlash>(
         self,
         flash: &mut F,
@@ -183,8 +191,8 @@ impl Page {
         Ok(self.word(flash, records_end + self.format.unit)? == MARK)
     }
 
-    /// The end of what a save that was cut can have programmed if it began at `at`: the words are programmed in order,
-    /// so after a head that is not whole there is nothing, and after a commit word that is wrong no closing mark.
+    /// The end of the words that a save which began at `at` and was cut can have programmed. Words are programmed in
+    /// order, so an incomplete head is followed by nothing, and a wrong commit word is not followed by a closing mark.
     pub(crate) fn reach_of_a_cut<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<u32, F::Error> {
         if !self.has_room_for_a_head(at) {
             return Ok(at);
@@ -193,7 +201,7 @@ impl Page {
         Ok(head.map_or(at + self.format.head(), |(_, records_end)| records_end + self.format.unit))
     }
 
-    /// Which groups the transaction at `at` has named, and where its records end; `None` for a head that is not whole.
+    /// The groups named by the transaction at `at`, and the end of its records; `None` for an incomplete head.
     pub(crate) fn head<F: ReadNorFlash>(
         self,
         flash: &mut F,

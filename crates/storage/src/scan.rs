@@ -1,4 +1,4 @@
-//! One pass over a page: which transactions it holds and what may follow.
+//! One pass over a page: its transactions, and the place where the next one may follow.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
@@ -6,19 +6,19 @@ use crate::format::{CLEAN, KIND_VALUE, MARK};
 use crate::group::{GroupSet, Health, PerGroup};
 use crate::page::{Page, StoredRecord, Transaction};
 
-/// Where a stored value is.
+/// The place of a stored value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Slot {
     pub(crate) page: Page,
-    /// Where its record begins.
+    /// The start of the record.
     pub(crate) record: u32,
-    /// Its first byte.
+    /// The first byte of the value.
     pub(crate) data: u32,
     pub(crate) version: u16,
     pub(crate) len: u32,
 }
 
-/// The state of a group after all records; the last one counts.
+/// The content of a group after all records; the last record counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Content {
     #[default]
@@ -27,11 +27,11 @@ pub(crate) enum Content {
     Value(Slot),
 }
 
-/// A group as read.
+/// A group as read from a page.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
     pub(crate) content: Content,
-    /// A record that came later is damaged, and was or may have been one of this group.
+    /// A later record is damaged, and belongs or may have belonged to this group.
     pub(crate) suspect: bool,
 }
 
@@ -45,30 +45,30 @@ impl Entry {
     }
 }
 
-/// The first transaction of a page, with which the page takes over from the other one. It names every group.
+/// The first transaction of a page, with which the page takes over from the other page. It names every group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum First {
-    /// There is none, or it cannot be read.
+    /// The transaction does not exist or cannot be read.
     Missing,
     /// Complete but not closed: the power may have been cut at the commit word, which then reads well only by chance.
     Open,
     Closed,
 }
 
-/// A page as read.
+/// The content of a page.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scan {
     pub(crate) page: Page,
-    /// Which use of a page this is, counted over both; `None` when it holds no complete transaction.
+    /// Number of this use of a page, counted over both pages; `None` if the page has no complete transaction.
     pub(crate) generation: Option<u16>,
     pub(crate) first: First,
     /// The store has moved on to the other page.
     pub(crate) left: bool,
-    /// Erased to the end and not written since.
+    /// Fully erased, and not written since.
     pub(crate) clean: bool,
-    /// Nothing but closed transactions and erased words: the page may be appended to.
+    /// The page has only closed transactions and erased words, so transactions may be appended.
     pub(crate) tidy: bool,
-    /// Where the last complete transaction ends.
+    /// The end of the last complete transaction.
     pub(crate) end: u32,
     pub(crate) groups: PerGroup<Entry>,
 }
@@ -95,8 +95,7 @@ impl Scan {
         self.tidy && !self.left
     }
 
-    /// Takes every complete transaction. Transactions are contiguous, so one that does not begin where the last ended
-    /// has something damaged before it.
+    /// Takes every complete transaction. Transactions are contiguous, so a gap before one means damage.
     fn transactions<F: ReadNorFlash>(&mut self, flash: &mut F) -> Result<(), F::Error> {
         let mut at = self.page.format.first();
         while at < self.page.size {
@@ -126,8 +125,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Takes every intact record between two places, and says of which groups they are. What is damaged is passed over unit
-    /// by unit.
+    /// Takes every intact record between two places, and returns their groups. Damaged parts are skipped unit by unit.
     fn records<F: ReadNorFlash>(&mut self, flash: &mut F, from: u32, to: u32) -> Result<GroupSet, F::Error> {
         let (mut at, mut found) = (from, GroupSet::NONE);
         while at < to {
@@ -153,7 +151,7 @@ impl Scan {
         }
     }
 
-    /// Judges what follows the last complete transaction: erased, a save that was cut, or damage.
+    /// Judges the part after the last complete transaction: erased, a save that was cut, or damage.
     fn rest<F: ReadNorFlash>(&mut self, flash: &mut F) -> Result<(), F::Error> {
         if self.page.erased_from(flash, self.end)? {
             return Ok(());
@@ -165,8 +163,8 @@ impl Scan {
         Ok(())
     }
 
-    /// Takes what is intact of damaged transactions, from the end of the last one that was read up to `to`. Stops at a save
-    /// that was cut: nothing of it counts, and nothing is lost.
+    /// Takes the intact records of damaged transactions, from the end of the last transaction up to `to`. Stops at a
+    /// save that was cut: nothing of it counts, and nothing is lost.
     fn salvage<F: ReadNorFlash>(&mut self, flash: &mut F, to: u32) -> Result<(), F::Error> {
         self.tidy = false;
         while self.end < to {
@@ -188,7 +186,7 @@ impl Scan {
         Ok(())
     }
 
-    /// A transaction whose head is intact and which has named these groups: those of which there is no intact record.
+    /// Takes a transaction with an intact head that names these groups. Returns the groups without an intact record.
     fn salvage_named<F: ReadNorFlash>(
         &mut self,
         flash: &mut F,
@@ -201,8 +199,8 @@ impl Scan {
         Ok(missing)
     }
 
-    /// A transaction whose head is damaged. When its records follow each other up to a closing mark, nothing is missing;
-    /// otherwise any group may have been in it.
+    /// Takes a transaction with a damaged head. If its records follow each other up to a closing mark, nothing is
+    /// missing; otherwise any group may have been in it.
     fn salvage_unnamed<F: ReadNorFlash>(&mut self, flash: &mut F, to: u32) -> Result<GroupSet, F::Error> {
         let first = self.end + self.page.format.head();
         let limit = to.saturating_sub(self.page.format.tail());
@@ -218,7 +216,7 @@ impl Scan {
         Ok(GroupSet::NONE)
     }
 
-    /// Goes on behind a transaction that is not whole.
+    /// Continues after an incomplete transaction.
     fn pass(&mut self, records_end: u32, missing: GroupSet) {
         if self.end == self.page.format.first() && missing == GroupSet::NONE {
             self.first = First::Closed;
@@ -226,7 +224,7 @@ impl Scan {
         self.end = records_end + self.page.format.tail();
     }
 
-    /// Notes that what was saved last of these groups cannot be read.
+    /// Takes note that the last saved values of these groups cannot be read.
     fn suspect(&mut self, groups: GroupSet) {
         let named = self.groups.iter_mut().filter(|(group, _)| groups.contains(*group));
         named.for_each(|(_, entry)| entry.suspect = true);
@@ -239,12 +237,12 @@ mod tests {
 
     use super::*;
     use crate::format::{Check, Contents, ERASED, Format, WORD};
-    use crate::group::Group;
+    use crate::group::ParameterGroup;
     use crate::memory::Memory;
 
     const FORMAT: Format = Format::new(WORD).unwrap();
 
-    /// A page of 64 bytes with one transaction of these words, the first of them the head of a record.
+    /// A page of 64 bytes with one transaction of these words, which start with the head of a record.
     fn scan(words_of_record: &[u32]) -> Scan {
         let first = FORMAT.first();
         let mut record = Check::new(first + FORMAT.head());
@@ -264,16 +262,16 @@ mod tests {
         Scan::of(&mut Memory(bytes.as_slice()), Page { start: 0, size: 64, format: FORMAT }).unwrap()
     }
 
-    fn head(group: Group) -> u32 {
+    fn head(group: ParameterGroup) -> u32 {
         u32::from_le_bytes([group.id(), KIND_VALUE, 9, 0])
     }
 
     #[test]
     fn a_record_ends_where_its_transaction_ends_at_the_latest() {
-        // Five to eight bytes have their check word where the test puts it.
+        // With five to eight bytes, the check word is where the test puts it.
         for (len, fits) in [(5, true), (8, true), (9, false), (0xFFFF, false)] {
-            let scan = scan(&[head(Group::Device), len, 0x1111, 0x2222]);
-            let content = scan.groups.get(Group::Device).content;
+            let scan = scan(&[head(ParameterGroup::Device), len, 0x1111, 0x2222]);
+            let content = scan.groups.get(ParameterGroup::Device).content;
             assert_eq!(matches!(content, Content::Value(slot) if slot.len == len), fits, "{len} bytes");
             assert!(scan.tidy);
         }

@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::NorFlash;
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::{CLEAN, Format, MARK};
-use crate::group::{Change, Group, Health, Loaded, PerGroup};
+use crate::group::{Change, Health, Loaded, ParameterGroup, PerGroup};
 use crate::page::Page;
 #[cfg(doc)]
 use crate::page::Pages;
@@ -16,28 +16,28 @@ use crate::writer::{Record, Records, Writer, size};
 /// The longest value of a group in bytes. Four of them fit a page of 16 KiB.
 pub const MAX_VALUE: usize = 2048;
 
-/// The parameter store. One owner; every call leaves the flash in a state that survives a power cut.
+/// The parameter store. It has one owner; every call leaves the flash in a state that survives a power cut.
 #[derive(Debug)]
 pub struct Store<F> {
     view: View<F>,
 }
 
 impl<F: NorFlash> Store<F> {
-    /// The flash, for what lies beside the pages.
+    /// The flash, for access outside of the pages.
     pub fn flash(&mut self) -> &mut F {
         &mut self.view.flash
     }
 
-    /// Makes the store ready for saving: erases whatever page is not in use and not erased yet. Where the page in use
-    /// was cut or damaged, first moves what can be read to the other page, so that nothing is ever appended to doubtful
-    /// words, and what this start has read holds for good.
+    /// Makes the store ready for saving: erases the page that is not in use, unless it is erased already. If the page
+    /// in use was cut or damaged, its readable data is first moved to the other page. Nothing is therefore ever
+    /// appended to doubtful words, and the values read at this start are final.
     ///
     /// To be called at start-up, before the node goes on the bus: an erase of 16 KiB stops a single-bank flash for
     /// 0.25 s, and there can be two. Most starts erase nothing.
     ///
     /// # Errors
-    /// [`Error::Flash`]; [`Error::Corrupt`] when a page does not erase or does not take what is programmed;
-    /// [`Error::Geometry`] when the flash cannot erase the pages one by one, or programs other words than [`Pages`] says.
+    /// [`Error::Flash`]; [`Error::Corrupt`] if a page cannot be erased or programmed; [`Error::Geometry`] if the flash
+    /// cannot erase the pages separately, or programs other words than [`Pages`] says.
     pub fn prepare(view: View<F>) -> Result<Store<F>, Error<F::Error>> {
         if !view.pages.suits(F::WRITE_SIZE) {
             return Err(Error::Geometry);
@@ -51,19 +51,18 @@ impl<F: NorFlash> Store<F> {
         }
         let old = *store.current();
         if old.generation.is_some() && !old.can_grow() {
-            store.move_on(&store.kept())?;
+            store.move_on(&store.existing())?;
             store.erase(old.page)?;
         }
         Ok(store)
     }
 
-    /// Makes all `changes` or none. Of several changes to one group the last counts; what is stored already is not
-    /// written again. Only programs words, about 16 us
-    /// each, and never erases.
+    /// Makes all `changes` or none. The last of several changes to one group counts; values that are already stored are
+    /// not written again. Only programs words, about 16 us each, and never erases.
     ///
     /// # Errors
-    /// [`Error::TooLong`] and [`Error::RestartNeeded`]: nothing was changed. [`Error::Flash`] and [`Error::Corrupt`]: the
-    /// flash did not do what it was told; the groups are as [`Store::load`] says, all old or all new.
+    /// [`Error::TooLong`] and [`Error::RestartNeeded`]: nothing was changed. [`Error::Flash`] and [`Error::Corrupt`]:
+    /// the flash has failed; [`Store::load`] returns the state of the groups, all old or all new.
     pub fn save(&mut self, changes: &[Change<'_>]) -> Result<(), Error<F::Error>> {
         if changes.is_empty() {
             return Ok(());
@@ -71,8 +70,9 @@ impl<F: NorFlash> Store<F> {
         let too_long =
             |change: &Change<'_>| matches!(change, Change::Set { value, .. } if value.len() > MAX_VALUE);
         let mut new = PerGroup::from_fn(|group| last_change(changes, group));
-        let whole = PerGroup::from_fn(|group| new.get(group).or(*self.kept().get(group)));
-        // A value that a page could not hold alone could never be moved, so it is refused while there is still room for it.
+        let whole = PerGroup::from_fn(|group| new.get(group).or(*self.existing().get(group)));
+        // A value that does not fit a page alone could never be moved, so it is refused although there is still room
+        // for it.
         if changes.iter().any(too_long) || size(&whole, self.format()) > self.current().page.room() {
             return Err(Error::TooLong);
         }
@@ -89,9 +89,9 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Values that are stored already are not written again: a master that saves after every start costs no flash.
+    /// Removes values that are already stored: a master that saves after every start does not wear the flash.
     fn drop_unchanged(&mut self, records: &mut Records<'_>) -> Result<(), F::Error> {
-        for group in Group::ALL {
+        for group in ParameterGroup::ALL {
             let is_same = match (records.get(group), self.current_content(group)) {
                 (Some(Record::Set { version, value }), Content::Value(slot)) if slot.version == *version => {
                     self.view.holds(&slot, value)?
@@ -106,8 +106,9 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// The value of the group that the next start would read. Nothing of a damaged page counts: the page is written anew.
-    fn current_content(&self, group: Group) -> Content {
+    /// The content of the group that the next start would read. Values in a damaged page do not count, because the page
+    /// will be rewritten.
+    fn current_content(&self, group: ParameterGroup) -> Content {
         let entry = self.view.state.groups.get(group);
         if entry.suspect { Content::Unnamed } else { entry.content }
     }
@@ -116,7 +117,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Errors of [`View::load`].
-    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    pub fn load(&mut self, group: ParameterGroup, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         self.view.load(group, buf)
     }
 
@@ -128,13 +129,13 @@ impl<F: NorFlash> Store<F> {
         self.view.device()
     }
 
-    /// The [`View::health`] that the view found, also after `prepare` has mended the store.
+    /// The [`View::health`] at the opening of the view, even after `prepare` has repaired the store.
     #[must_use]
-    pub fn health(&self, group: Group) -> Health {
+    pub fn health(&self, group: ParameterGroup) -> Health {
         self.view.health(group)
     }
 
-    /// Gives the flash back.
+    /// Returns the flash.
     #[must_use]
     pub fn into_flash(self) -> F {
         self.view.into_flash()
@@ -160,8 +161,8 @@ impl<F: NorFlash> Store<F> {
         [self.current(), self.other()].into_iter().any(|scan| scan.page == page && scan.clean)
     }
 
-    /// A record for every group as it is.
-    fn kept(&self) -> Records<'static> {
+    /// A record of the present state of every group.
+    fn existing(&self) -> Records<'static> {
         PerGroup::from_fn(|group| Some(Record::from(self.view.state.groups.get(group).content)))
     }
 
@@ -175,10 +176,10 @@ impl<F: NorFlash> Store<F> {
         self.write(page, end, generation.unwrap_or(0), records)
     }
 
-    /// Writes the records, which name every group, as the first transaction of the other page. From its commit on that
-    /// page counts.
+    /// Writes the records, which name every group, as the first transaction of the other page. From its commit on, that
+    /// page is in use.
     fn move_on(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
-        self.verify_kept(records)?;
+        self.verify_existing(records)?;
         let old = *self.current();
         let generation = old.generation.map_or(0, |generation| generation.wrapping_add(1));
         self.write(self.other().page, self.format().first(), generation, records)?;
@@ -188,17 +189,17 @@ impl<F: NorFlash> Store<F> {
         Writer::new(&mut self.view.flash, old.page, old.page.format.left_at()).program(MARK)
     }
 
-    /// A value that has decayed since it was read must not get a new CRC.
-    fn verify_kept(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
+    /// Checks values again before they are copied: a value that has decayed since it was read must not get a new CRC.
+    fn verify_existing(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
         for (_, record) in records.iter() {
-            if let Some(Record::Kept(slot)) = record {
+            if let Some(Record::Existing(slot)) = record {
                 self.view.verify(slot)?;
             }
         }
         Ok(())
     }
 
-    /// Writes a transaction, then reads the pages again: what the store knows is always what the flash says.
+    /// Writes a transaction, then reads the pages again, so that the state in RAM always agrees with the flash.
     fn write(
         &mut self,
         page: Page,
@@ -226,6 +227,6 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
-fn last_change<'a>(changes: &[Change<'a>], group: Group) -> Option<Record<'a>> {
+fn last_change<'a>(changes: &[Change<'a>], group: ParameterGroup) -> Option<Record<'a>> {
     changes.iter().rev().find(|change| change.group() == group).map(|&change| Record::from(change))
 }

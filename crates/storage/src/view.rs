@@ -1,15 +1,15 @@
-//! Reading: which page counts, and what it says of each group.
+//! Reading: the page in use, and its state of each group.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::WORD;
-use crate::group::{Group, Health, Loaded, PerGroup};
+use crate::group::{Health, Loaded, ParameterGroup, PerGroup};
 use crate::page::Pages;
 use crate::scan::{Content, Entry, First, Scan, Slot};
 
-/// The store as start-up code and host tools see it: read only.
+/// The store for start-up code and host tools: read only.
 #[derive(Debug)]
 pub struct View<F> {
     pub(crate) flash: F,
@@ -18,10 +18,10 @@ pub struct View<F> {
     health: PerGroup<Health>,
 }
 
-/// The state of the store from both pages.
+/// The state of the store, from both pages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State {
-    /// The page in use; when `generation` is `None` no page is in use.
+    /// The page in use; no page is in use if its `generation` is `None`.
     pub(crate) current: Scan,
     pub(crate) other: Scan,
     pub(crate) groups: PerGroup<Entry>,
@@ -31,8 +31,8 @@ impl<F: ReadNorFlash> View<F> {
     /// Reads both pages. Nothing is written.
     ///
     /// # Errors
-    /// [`Error::Geometry`] when the pages do not fit the flash, [`Error::Flash`] when it cannot be read. Whatever the
-    /// pages hold is no error: see [`View::health`].
+    /// [`Error::Geometry`] if the pages do not fit the flash, [`Error::Flash`] if the flash cannot be read. Damaged
+    /// content of the pages is no error: see [`View::health`].
     pub fn open(mut flash: F, pages: Pages) -> Result<View<F>, Error<F::Error>> {
         const { assert!((WORD as usize).is_multiple_of(F::READ_SIZE), "the store reads words of 32 bits") };
         let state = State::read(&mut flash, pages)?;
@@ -40,13 +40,13 @@ impl<F: ReadNorFlash> View<F> {
         Ok(View { flash, pages, state, health })
     }
 
-    /// Puts the value of a group at the beginning of `buf`; `None` when there is none and the caller's defaults hold.
-    /// The value is checked once more against its CRC-32.
+    /// Puts the value of a group at the beginning of `buf`; `None` if there is no value, so that the caller's defaults
+    /// are in use. The CRC-32 of the value is checked again.
     ///
     /// # Errors
-    /// [`Error::BufferTooSmall`]; [`Error::Corrupt`] when the flash has changed since it was opened;
-    /// [`Error::Flash`]. After an error the content of `buf` has no meaning.
-    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    /// [`Error::BufferTooSmall`]; [`Error::Corrupt`] if the flash has changed since it was opened; [`Error::Flash`].
+    /// After an error the content of `buf` is meaningless.
+    pub fn load(&mut self, group: ParameterGroup, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         let Content::Value(slot) = self.state.groups.get(group).content else { return Ok(None) };
         let len = slot.len as usize;
         let target = buf.get_mut(..len).ok_or(Error::BufferTooSmall)?;
@@ -55,13 +55,13 @@ impl<F: ReadNorFlash> View<F> {
         Ok(Some(Loaded { version: slot.version, len }))
     }
 
-    /// The device record; `None` when none is stored or it is of a layout that this program does not know.
+    /// The device record; `None` if none is stored or its layout is unknown to this program.
     ///
     /// # Errors
     /// Errors of [`View::load`].
     pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
         let mut buf = [0; DeviceRecord::ROOM];
-        match self.load(Group::Device, &mut buf) {
+        match self.load(ParameterGroup::Device, &mut buf) {
             Ok(Some(loaded)) => {
                 Ok(buf.get(..loaded.len).and_then(|value| DeviceRecord::decode(loaded.version, value)))
             }
@@ -72,11 +72,11 @@ impl<F: ReadNorFlash> View<F> {
 
     /// Whether the newest values of a group could be read when the store was opened.
     #[must_use]
-    pub fn health(&self, group: Group) -> Health {
+    pub fn health(&self, group: ParameterGroup) -> Health {
         *self.health.get(group)
     }
 
-    /// Gives the flash back.
+    /// Returns the flash.
     #[must_use]
     pub fn into_flash(self) -> F {
         self.flash
@@ -91,7 +91,7 @@ impl<F: ReadNorFlash> View<F> {
         Ok(slot.page.record(&mut self.flash, slot.record, slot.page.size)?.is_some())
     }
 
-    /// Whether a stored value is intact and these bytes.
+    /// Whether a stored value is intact and equal to these bytes.
     pub(crate) fn holds(&mut self, slot: &Slot, value: &[u8]) -> Result<bool, F::Error> {
         if slot.len as usize != value.len() || !self.is_intact(slot)? {
             return Ok(false);
@@ -106,7 +106,7 @@ impl<F: ReadNorFlash> View<F> {
         Ok(true)
     }
 
-    /// Reads both pages again after one has been written.
+    /// Reads both pages again after a write.
     pub(crate) fn refresh(&mut self) -> Result<(), Error<F::Error>> {
         self.state = State::read(&mut self.flash, self.pages)?;
         Ok(())
@@ -122,7 +122,7 @@ impl State {
     }
 }
 
-/// The page in use first: the newer one, unless it cannot be relied on and the older one is still there. When none is in
+/// The page in use first: the newer page, unless it cannot be relied on and the older page still exists. If none is in
 /// use, the page that can take the first save comes second.
 fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
     let (newer, older) = match (a.generation, b.generation) {
@@ -140,14 +140,14 @@ fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
     if took_over { (newer, older) } else { (older, newer) }
 }
 
-/// Whether generation `x` comes after `y`. They are never far apart, so this holds across the wrap.
+/// Whether generation `x` comes after `y`. The two are never far apart, so a wrap does not matter.
 pub(crate) fn follows(x: u16, y: u16) -> bool {
     x.wrapping_sub(y).cast_signed() > 0
 }
 
-/// The state of a group. A page in use that says it was left means that its successor cannot be read; with no page in
-/// use, damage in either may be all that is left of a value.
-fn merge(current: &Scan, other: &Scan, group: Group) -> Entry {
+/// The state of a group. If the page in use is marked as left, its successor cannot be read. If no page is in use,
+/// damage in either page may be the rest of a value.
+fn merge(current: &Scan, other: &Scan, group: ParameterGroup) -> Entry {
     let (mine, theirs) = (current.groups.get(group), other.groups.get(group));
     let successor_lost = current.left || (current.generation.is_none() && theirs.suspect);
     Entry { suspect: mine.suspect || successor_lost, ..*mine }

@@ -1,10 +1,10 @@
-//! Programming one transaction, word after word.
+//! Programs one transaction, word after word.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words};
-use crate::group::{Change, Group, GroupSet, PerGroup};
+use crate::group::{Change, GroupSet, ParameterGroup, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
 
@@ -12,7 +12,7 @@ use crate::scan::{Content, Slot};
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Record<'a> {
     Set { version: u16, value: &'a [u8] },
-    Kept(Slot),
+    Existing(Slot),
     Restored,
 }
 
@@ -20,7 +20,7 @@ impl Record<'_> {
     fn len(&self) -> u32 {
         match self {
             Record::Set { value, .. } => u32::try_from(value.len()).unwrap_or(u32::MAX),
-            Record::Kept(slot) => slot.len,
+            Record::Existing(slot) => slot.len,
             Record::Restored => 0,
         }
     }
@@ -38,7 +38,7 @@ impl<'a> From<Change<'a>> for Record<'a> {
 impl From<Content> for Record<'_> {
     fn from(content: Content) -> Self {
         match content {
-            Content::Value(slot) => Record::Kept(slot),
+            Content::Value(slot) => Record::Existing(slot),
             Content::Restored | Content::Unnamed => Record::Restored,
         }
     }
@@ -47,7 +47,7 @@ impl From<Content> for Record<'_> {
 /// The records of a transaction; groups without one stay as they are.
 pub(crate) type Records<'a> = PerGroup<Option<Record<'a>>>;
 
-/// Bytes that a transaction takes up. Values are at most [`crate::MAX_VALUE`] long.
+/// Size of a transaction in bytes. Values have at most [`crate::MAX_VALUE`] bytes.
 pub(crate) fn size(records: &Records<'_>, format: Format) -> u32 {
     format.head() + records_size(records, format) + format.tail()
 }
@@ -57,16 +57,16 @@ fn records_size(records: &Records<'_>, format: Format) -> u32 {
     records.map(|record| format.record_head() + format.body(record.len())).sum()
 }
 
-/// Where the next unit goes.
+/// Programs units at consecutive places.
 pub(crate) struct Writer<'f, F> {
     flash: &'f mut F,
     page: Page,
     at: u32,
-    /// Check of the transaction.
+    /// Checksum of the transaction.
     check: Check,
-    /// Check of the record under way.
+    /// Checksum of the present record.
     record_check: Check,
-    /// The words of a unit that is not full yet, and zeros.
+    /// The words of an incomplete unit, followed by zeros.
     unit: [u8; LARGEST_UNIT as usize],
     filled: u32,
 }
@@ -77,8 +77,8 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Writer { flash, page, at, check, record_check, unit: [0; LARGEST_UNIT as usize], filled: 0 }
     }
 
-    /// Programs a transaction. It counts from the commit word on; the closing mark after it says that the commit word
-    /// is whole. The caller has made sure that it fits.
+    /// Programs a transaction. The transaction counts from the commit word on; the closing mark after the commit word
+    /// proves that the commit word is complete. The caller has checked that the transaction fits.
     pub(crate) fn transaction(
         &mut self,
         generation: u16,
@@ -103,9 +103,14 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.program(MARK)
     }
 
-    fn record(&mut self, group: Group, record: &Record<'_>, generation: u16) -> Result<(), Error<F::Error>> {
+    fn record(
+        &mut self,
+        group: ParameterGroup,
+        record: &Record<'_>,
+        generation: u16,
+    ) -> Result<(), Error<F::Error>> {
         let (kind, version) = match *record {
-            Record::Set { version, .. } | Record::Kept(Slot { version, .. }) => (KIND_VALUE, version),
+            Record::Set { version, .. } | Record::Existing(Slot { version, .. }) => (KIND_VALUE, version),
             Record::Restored => (KIND_RESTORED, 0),
         };
         self.record_check = Check::new(self.at);
@@ -116,7 +121,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.fill()?;
         match *record {
             Record::Set { value, .. } => self.value(value)?,
-            Record::Kept(slot) => self.copy(&slot)?,
+            Record::Existing(slot) => self.copy(&slot)?,
             Record::Restored => {}
         }
         let check = core::mem::replace(&mut self.record_check, Check::new(0));
@@ -124,7 +129,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.fill()
     }
 
-    /// The value and zeros up to a whole word.
+    /// Writes the value, and zeros up to a whole word.
     fn value(&mut self, value: &[u8]) -> Result<(), Error<F::Error>> {
         for chunk in value.chunks(WORD as usize) {
             let mut word = [0; WORD as usize];
@@ -134,7 +139,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// A value that is in flash already: no buffer is needed to move it.
+    /// Copies a value that is already in flash, so a move needs no buffer.
     fn copy(&mut self, slot: &Slot) -> Result<(), Error<F::Error>> {
         let end = slot.data + in_words(slot.len);
         for at in (slot.data..end).step_by(WORD as usize) {
@@ -144,7 +149,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// Zeros up to the end of the unit. The commit word vouches for them too.
+    /// Writes zeros up to the end of the unit. The commit word covers them too.
     fn fill(&mut self) -> Result<(), Error<F::Error>> {
         while self.filled > 0 {
             self.word(0)?;
@@ -152,14 +157,14 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// A word that the check of the record and the commit word vouch for.
+    /// Writes a word that is covered by the check of the record and by the commit word.
     fn word(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         self.check.add(word);
         self.record_check.add(word);
         self.put(word)
     }
 
-    /// A word in a unit of its own.
+    /// Writes a word in a unit of its own.
     pub(crate) fn program(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         self.put(word)?;
         while self.filled > 0 {
@@ -168,7 +173,8 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// Puts a word into the unit. One unit a call to the driver: between two calls the core runs whatever is due.
+    /// Puts a word into the unit. One unit per call of the driver: between two calls the core runs other tasks that are
+    /// due.
     fn put(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         let place = self.unit.iter_mut().skip(self.filled as usize);
         place.zip(word.to_le_bytes()).for_each(|(to, byte)| *to = byte);

@@ -1,4 +1,4 @@
-//! Where things are in flash. Offsets count from the start of the flash, not of the address space.
+//! The areas of an update in flash. Offsets count from the start of the flash, not of the address space.
 
 use core::ops::Range;
 
@@ -6,7 +6,7 @@ use crate::header::HEADER;
 use crate::record::RECORD_ROOM;
 use crate::security::Security;
 
-/// Consecutive sectors, of whatever sizes.
+/// Consecutive sectors of any sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
     start: u32,
@@ -26,7 +26,7 @@ impl Area {
         self.start
     }
 
-    /// Bytes.
+    /// Size in bytes.
     #[must_use]
     pub const fn size(&self) -> u32 {
         let (mut size, mut rest) = (0_u32, self.sectors);
@@ -37,7 +37,7 @@ impl Area {
         size
     }
 
-    /// Offset of the first byte after it.
+    /// Offset of the first byte after the area.
     #[must_use]
     pub const fn end(&self) -> u32 {
         self.start.saturating_add(self.size())
@@ -63,7 +63,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// A layout; `None` when there is no room for an image, or for a security counter.
+    /// A layout; `None` if there is no room for an image or for a security counter.
     #[must_use]
     pub const fn new(security: Area, application: Area, staging: Area, kept: Area) -> Option<Layout> {
         let layout = Layout { security, application, staging, kept };
@@ -71,32 +71,33 @@ impl Layout {
         if fits { Some(layout) } else { None }
     }
 
-    /// Where the security counter and the revoked keys are: an update programs it, and nothing erases it.
+    /// The area of the security counter and the revoked keys: an update programs it, and nothing ever erases it.
     #[must_use]
     pub const fn security(&self) -> Area {
         self.security
     }
 
-    /// Where the application runs: its header, then its vector table.
+    /// The area where the application runs: its header, then its vector table.
     #[must_use]
     pub const fn application(&self) -> Area {
         self.application
     }
 
-    /// Where a download goes: the image, and in the last bytes the commit record.
+    /// The area of a download: the image, and in the last bytes the commit record.
     #[must_use]
     pub const fn staging(&self) -> Area {
         self.staging
     }
 
-    /// Where the image that ran before is kept while the one in the application area is on trial, with a record as that of staging.
+    /// The area where the previous image is kept while the image in the application area is on trial, with a record
+    /// like that of staging.
     #[must_use]
     pub const fn kept(&self) -> Area {
         self.kept
     }
 
-    /// Bytes of the longest image, header and code: it fits the application area, and staging and the kept image beside their
-    /// records.
+    /// Length of the longest image, header and code, in bytes: it must fit the application area, and staging and the
+    /// kept image next to their records.
     #[must_use]
     pub const fn longest_image(&self) -> u32 {
         let beside_record = least(self.staging.size(), self.kept.size()).saturating_sub(RECORD_ROOM);

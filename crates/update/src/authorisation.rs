@@ -1,7 +1,9 @@
-//! Who may change the program, where the owner of the bootloader has set a key: whoever answers the challenge of this start (2003h).
+//! Permission to change the program, for a bootloader with an authorisation key: a client must answer the challenge of
+//! this start (2003h).
 //!
-//! The bootloader makes a [`Pair`] of challenge and response at each start. The application is given the pair and never the key: an
-//! answer is compared, not computed. The next start has another challenge, so what was heard on the bus is of no use then.
+//! The bootloader makes a [`Pair`] of challenge and response at each start. The application gets the pair and never the
+//! key, so an answer is compared, not computed. The next start has another challenge, so a response recorded from the
+//! bus is useless then.
 
 use core::fmt;
 
@@ -12,15 +14,16 @@ use crate::key::{KEY_LEN, key};
 /// Bytes of a challenge, and of the response.
 pub const RESPONSE_LEN: usize = 8;
 
-/// The key of this bootloader: what the variable `UPDATE_AUTHORISATION_KEY` says when the bootloader is built, 64 hexadecimal digits.
-/// Without the variable everybody may change the program.
+/// The key of this bootloader: 64 hexadecimal digits in the variable `UPDATE_AUTHORISATION_KEY` when the bootloader is
+/// built. Without the variable anybody may change the program.
 pub const AUTHORISATION_KEY: Option<[u8; KEY_LEN]> = match option_env!("UPDATE_AUTHORISATION_KEY") {
     Some(digits) => Some(key(digits.as_bytes())),
     None => None,
 };
 
-/// The response that the holder of the key gives to the challenge of the node with this serial number (1018h:4): the first eight bytes
-/// of HMAC-SHA-512 (RFC 2104) over the challenge and the serial number, both as an SDO has them, low byte first.
+/// The response of the holder of the key to the challenge of the node with this serial number (1018h:4): the first
+/// eight bytes of HMAC-SHA-512 (RFC 2104) over the challenge and the serial number, both in the byte order of SDO, low
+/// byte first.
 #[must_use]
 pub fn response(
     key: &[u8; KEY_LEN],
@@ -31,8 +34,8 @@ pub fn response(
     bytes(code(key, &[a, b, serial_number]))
 }
 
-/// The first two words of the HMAC over these words, low byte first. It is gone through here because crate `hmac` takes more of the
-/// bootloader's flash than there is; the tests hold it to that crate.
+/// The first two words of the HMAC over these words, low byte first. Computed here because the crate `hmac` needs more
+/// of the bootloader's flash than is left; the tests compare with that crate.
 #[inline(never)]
 fn code(key: &[u8; KEY_LEN], message: &[u32]) -> [u32; 2] {
     let mut inner = keyed(key, 0x36);
@@ -44,7 +47,7 @@ fn code(key: &[u8; KEY_LEN], message: &[u32]) -> [u32; 2] {
     words(outer.finalize().first_chunk().copied().unwrap_or_default())
 }
 
-/// A hash that begins with the key, filled up to a block, each byte of it changed by the pad (RFC 2104, 2).
+/// A hash that begins with the key, padded to a block, with each byte combined with the pad (RFC 2104, 2).
 fn keyed(key: &[u8; KEY_LEN], pad: u8) -> Sha512 {
     let mut block = [pad; 128];
     block.iter_mut().zip(key).for_each(|(to, from)| *to ^= from);
@@ -68,8 +71,8 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// The pair of a start. `noise` makes the challenge another one at each start; nobody can foretell the challenge from the noise
-    /// without the key.
+    /// The pair of a start. `noise` makes the challenge different at each start; nobody can predict the challenge from
+    /// the noise without the key.
     #[must_use]
     pub fn new(key: &[u8; KEY_LEN], noise: &[u32], serial_number: u32) -> Pair {
         let challenge = code(key, noise);
@@ -77,30 +80,31 @@ impl Pair {
         Pair { challenge, response: code(key, &[a, b, serial_number]) }
     }
 
-    /// As it is kept in RAM: challenge, then response, low word first.
+    /// The words kept in RAM: challenge, then response, low word first.
     #[must_use]
     pub fn words(&self) -> [u32; 4] {
         let ([a, b], [c, d]) = (self.challenge, self.response);
         [a, b, c, d]
     }
 
-    /// The other way round.
+    /// The pair in the words kept in RAM.
     #[must_use]
     pub fn from_words([a, b, c, d]: [u32; 4]) -> Pair {
         Pair { challenge: [a, b], response: [c, d] }
     }
 }
 
-/// Whether the program may be changed, as 2003h says it.
+/// Whether the program may be changed, for 2003h.
 #[derive(Clone, Copy, Default)]
 pub struct Authorisation {
-    /// `None` where no key is set: everybody may.
+    /// `None` if no key is set, so that anybody may change the program.
     pair: Option<Pair>,
     is_answered: bool,
 }
 
 impl Authorisation {
-    /// Of a start with this pair. `is_answered` where the challenge of the start before was answered, and this start followed from it.
+    /// The authorisation of a start with this pair. `is_answered`: the challenge of the previous start was answered,
+    /// and that start requested this one.
     #[must_use]
     pub fn new(pair: Option<Pair>, is_answered: bool) -> Authorisation {
         Authorisation { pair, is_answered }
@@ -116,16 +120,16 @@ impl Authorisation {
         }
     }
 
-    /// 2003h:2: the challenge of this start; zeros where no key is set.
+    /// 2003h:2: the challenge of this start; zeros if no key is set.
     #[must_use]
     pub fn challenge(&self) -> [u8; RESPONSE_LEN] {
         bytes(self.pair.map_or([0; 2], |pair| pair.challenge))
     }
 
-    /// 2003h:3 is written: whether it is the response.
+    /// Handles a write to 2003h:3; returns whether the bytes are the response.
     pub fn answer(&mut self, bytes: [u8; RESPONSE_LEN]) -> bool {
         let [low, high] = words(bytes);
-        // All of it is compared, however much is right: the time tells nothing.
+        // All bytes are always compared, so the time reveals nothing about a wrong response.
         let is_right = self.pair.is_some_and(|Pair { response: [a, b], .. }| (a ^ low) | (b ^ high) == 0);
         self.is_answered |= is_right;
         is_right
@@ -144,7 +148,7 @@ impl Authorisation {
     }
 }
 
-/// The response is not for a log.
+/// Keeps the response out of logs.
 impl fmt::Debug for Authorisation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Authorisation").field("state", &self.state()).finish_non_exhaustive()
@@ -160,8 +164,8 @@ mod tests {
     const KEY: [u8; KEY_LEN] = [0x42; KEY_LEN];
     const SERIAL: u32 = 0x1234_5678;
 
-    /// Python's
-    /// `hmac.new(bytes([0x42] * 32), bytes(range(8)) + bytes.fromhex("78563412"), "sha512").digest()[:8]`.
+    /// Computed in Python: `hmac.new(bytes([0x42] * 32), bytes(range(8)) + bytes.fromhex("78563412"),
+    /// "sha512").digest()[:8]`.
     #[test]
     fn the_response_is_that_of_another_implementation() {
         let challenge = [0, 1, 2, 3, 4, 5, 6, 7];

@@ -1,4 +1,4 @@
-//! What to do at a start.
+//! The decision at each start: run the application, copy an image, or stay in the bootloader.
 
 use crate::crashes::{Crashes, Reset};
 use crate::flash::Flash;
@@ -10,41 +10,41 @@ use crate::status::Status;
 use crate::target::Target;
 use crate::trial::{self, Trial};
 
-/// What a start has to go by besides the flash.
+/// Inputs of the decision besides the flash.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Start {
     /// The application was told to enter the bootloader (1F51h = 0 or 2).
     pub stay: bool,
     /// Why the chip was reset.
     pub reset: Reset,
-    /// The crashes of the application, this reset counted.
+    /// Number of crashes of the application, this reset included.
     pub crashes: Crashes,
     /// How far the signature of the application is proven.
     pub proof: Proof,
 }
 
-/// How far the signature of the application is proven since power-on.
+/// How far the signature of the application has been verified since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proof {
-    /// Nothing, as after power-on: it is checked.
+    /// Not verified, for example after power-on: the signature must be verified now.
     #[default]
     None,
-    /// The signature of the image whose header has this CRC was found good since power-on: for that image the CRC of the code is
-    /// enough. The number is the word that [`boot_sealed`] left at that start.
+    /// The signature of the image whose header has this CRC was verified since power-on, so for this image the CRC of
+    /// the code is enough. The number is the word that [`boot_sealed`] left at that start.
     Of(u32),
-    /// It does not matter now, as another start will decide.
+    /// Not needed now, because another start will decide.
     Waived,
 }
 
-/// What to do.
+/// The result of the decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
     /// Start the application; this is its header.
     Start(Header),
-    /// A checked image waits in staging: [`crate::Updater::install`], then ask again. If the answer is the same then, the
-    /// copy has failed; stay with what [`crate::Updater::status`] says.
+    /// A checked image waits in staging: call [`crate::Updater::install`], then ask again. If the answer is the same
+    /// again, the copy has failed: stay with [`crate::Updater::status`].
     Copy,
-    /// The trial of the application is lost: [`crate::Updater::revert`], then ask again.
+    /// The application has lost its trial: call [`crate::Updater::revert`], then ask again.
     Revert,
     /// Stay in the bootloader.
     Stay(Stay),
@@ -53,16 +53,16 @@ pub enum Decision {
 /// Why the bootloader stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stay {
-    /// It was asked to.
+    /// On request.
     Asked,
     /// There is no application that may be started, for this reason.
     NoProgram(Refusal),
-    /// The application has crashed so often.
+    /// The application has crashed this many times.
     Crashes(u8),
 }
 
 impl Stay {
-    /// What 1F57h reads until an update begins.
+    /// Value of 1F57h until an update begins.
     #[must_use]
     pub fn status(self) -> Status {
         match self {
@@ -74,20 +74,21 @@ impl Stay {
     }
 }
 
-/// Decides at every start. It reads the application once for its CRC and, without a [`Proof`], for its signature, so the clock
-/// should be fast by then: whoever has put an application there, and whatever has become of it since, only one that is signed
-/// starts. It writes where a commit was cut: a record that may read
-/// otherwise next time is revoked, so what this start decides holds for good. It counts the starts of an application on trial that
-/// nobody asked for. And it keeps the security counter of an application that is found to be signed and is not on trial, and the
-/// keys that this application revokes.
+/// Decides at every start. Reads the application once for its CRC and, without a [`Proof`], for its signature, so the
+/// clock should be fast before the call. Only a signed application is started, no matter how it got there.
+///
+/// Writes to the flash in these cases. A record that was cut and may read differently next time is revoked, so that the
+/// decision of this start is final. Unrequested starts of an application on trial are counted. For a signed application
+/// that is not on trial, its security counter and the keys that it revokes are recorded.
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
     boot_sealed(flash, target, start, &mut 0)
 }
 
-/// The same, with a word that is the CRC of the application's header when its signature is or was found good, by other means than
-/// the decision; what the word was before is lost. To start the application without this word is not allowed: see crate bsp.
+/// Like [`boot`], with a word that becomes the CRC of the application's header if its signature is or was verified,
+/// independently of the decision; the previous content of the word is lost. The application must not be started without
+/// this word: see crate bsp.
 pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal: &mut u32) -> Decision {
     let commit = commit(flash, target);
     let trial = trial(flash, target, start);
@@ -115,35 +116,36 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
             }
             Decision::Start(header)
         }
-        // The mark that the copy is done may have been cut, read as not programmed, and the copy begun again. Now it
-        // reads as programmed, but the image that it speaks of is still in staging.
+        // A cut while the copy was marked as done may have left a mark that read as not programmed, so the copy began
+        // again. Now the mark reads as programmed, but its image is still in staging.
         Err(_) if commit == Commit::Done => Decision::Copy,
         Err(refusal) => Decision::Stay(Stay::NoProgram(refusal)),
     }
 }
 
-/// What the commit record says, after a torn one was revoked.
+/// The state of the commit record, after an incomplete record was revoked.
 fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
     let record = trial::staged(&target.layout);
     let commit = record.read(flash);
     if commit == Commit::Torn {
-        // Should it fail, the next start tries again.
+        // If this fails, the next start tries again.
         let _ = record.revoke(flash);
     }
     commit
 }
 
-/// How the trial stands, after this start was counted.
+/// The state of the trial, after this start was counted.
 fn trial<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Trial {
     let is_counted = start.reset != Reset::Asked && start.proof != Proof::Waived;
     if is_counted && Trial::read(flash, &target.layout) == Trial::Open {
-        // Should it fail, the next start tries again.
+        // If this fails, the next start tries again.
         let _ = trial::strike(flash, &target.layout);
     }
     Trial::read(flash, &target.layout)
 }
 
-/// The application whose signature was found good since power-on has run, and may be about to be replaced.
+/// Records counter and revoked keys of the application whose signature was verified since power-on: it has run, and may
+/// be about to be replaced.
 fn note_proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) {
     if let Ok(header) = image::header(flash, target.layout.application())
         && proof == Proof::Of(header.crc())
@@ -152,16 +154,17 @@ fn note_proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) {
     }
 }
 
-/// Nothing older than this application runs from now on.
+/// Records that nothing older than this application may run from now on.
 fn note<F: Flash>(flash: &mut F, target: &Target, header: &Header) {
-    // Should it fail, the next start tries again.
+    // If this fails, the next start tries again.
     let _ = target.security().note(flash, header);
 }
 
-/// The header of the application, when all of it is there, it is one of this node, and its signature is or was found good.
+/// The header of the application, if the application is complete, is for this node, and its signature is or was
+/// verified.
 ///
 /// # Errors
-/// Why it may not be started.
+/// The reason why the application may not be started.
 pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Result<Header, Refusal> {
     sealed(flash, target, proof, &mut 0)
 }

@@ -1,5 +1,5 @@
-//! The copy of an image from one area to another. The header comes last and its CRC last of all, so a copy that was cut is
-//! no image.
+//! The copy of an image from one area to another. The header is written last, and its CRC at the end, so a copy that
+//! was cut is not a valid image.
 
 use core::ops::Range;
 
@@ -9,13 +9,13 @@ use crate::header::{HEADER_LEN, Header};
 use crate::image::{self, CrcCheck};
 use crate::refusal::Refusal;
 
-/// A copy, about to begin or under way: the image is checked, and its new place is erased before the first step.
+/// A copy: the image has been checked, and the destination is erased before the first step.
 pub(crate) struct Copy {
     header: Header,
     to: Area,
-    /// How far behind its new place the code is.
+    /// Distance of the source from the destination.
     distance: u32,
-    /// Code that is not copied yet, in its new place.
+    /// Range of the destination that is not copied yet.
     rest: Range<u32>,
     crc: CrcCheck,
 }
@@ -32,7 +32,8 @@ impl Copy {
         }
     }
 
-    /// Whether all is done: one chunk of code, then steps of the CRC of what was copied, then the header.
+    /// Does one step; returns whether the copy is complete. Copies the code chunk by chunk, then checks the CRC of the
+    /// copy in steps, then writes the header.
     pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         if !self.rest.is_empty() {
             self.copy_chunk(flash)?;

@@ -1,19 +1,19 @@
-//! How often the application has crashed since it last said that it is well.
+//! Number of crashes of the application since it last confirmed itself.
 
 /// The count, kept in RAM that survives a reset (region `RETAINED` of memory.x).
 ///
-/// The bootloader takes it from RAM at every start, counts the reset, puts it back, and asks [`crate::boot`]. The
-/// application [confirms](Crashes::confirmed) ten seconds after its start if it is on the bus and measures then, else as soon as it does. A
-/// start that is asked for (1F51h = 1) confirms too: it is another try.
+/// The bootloader takes the count from RAM at every start, counts the reset, stores the count, and calls
+/// [`crate::boot`]. The application [confirms](Crashes::confirmed) itself ten seconds after its start if it is then on
+/// the bus and measures, else as soon as it does. A requested start (1F51h = 1) confirms too, as a new attempt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Crashes(u8);
 
-/// Why the chip was reset, as far as it matters here.
+/// Why the chip was reset, in the categories that matter here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reset {
-    /// Power came: RAM holds nothing.
+    /// Power-on: RAM has lost its content.
     Power,
-    /// Somebody asked for it: an NMT command, 1F51h, the debugger.
+    /// Requested by an NMT command, 1F51h or the debugger.
     #[default]
     Asked,
     /// A fault, a panic or the watchdog.
@@ -21,10 +21,10 @@ pub enum Reset {
 }
 
 impl Crashes {
-    /// So many crashes without a confirmation keep the bootloader from starting the application.
+    /// Number of crashes without a confirmation at which the bootloader no longer starts the application.
     pub const LIMIT: u8 = 3;
 
-    /// The count in a word of RAM; 0 when the word is none, as after power-up.
+    /// The count in a word of RAM; 0 if the word is invalid, for example after power-up.
     #[must_use]
     pub fn from_word(word: u32) -> Crashes {
         let [count, ..] = word.to_le_bytes();
@@ -32,7 +32,7 @@ impl Crashes {
         if crashes.word() == word { crashes } else { Crashes(0) }
     }
 
-    /// The word to keep: the count, and its complement in the other three bytes.
+    /// The word to store: the count, and its complement in the other three bytes.
     #[must_use]
     pub fn word(self) -> u32 {
         u32::from_le_bytes([self.0, !self.0, !self.0, !self.0])
@@ -48,13 +48,13 @@ impl Crashes {
         }
     }
 
-    /// The application is well.
+    /// The count after the application has confirmed itself.
     #[must_use]
     pub fn confirmed(self) -> Crashes {
         Crashes(0)
     }
 
-    /// Crashes since the last confirmation.
+    /// Number of crashes since the last confirmation.
     #[must_use]
     pub fn count(self) -> u8 {
         self.0

@@ -1,4 +1,4 @@
-//! The erase of an area, sector by sector, and the proof that it is erased.
+//! The erase of an area, sector by sector, with a check that the area is erased.
 
 use core::ops::Range;
 
@@ -6,14 +6,14 @@ use crate::area::Area;
 use crate::flash::{Flash, all_are, read_step};
 use crate::refusal::Refusal;
 
-/// An erase under way.
+/// An erase in progress.
 #[derive(Clone, Debug)]
 pub(crate) struct Erase {
     area: Area,
-    /// Sectors whose erase was begun.
+    /// Number of sectors whose erase was begun.
     begun: usize,
     at_work: bool,
-    /// What is not known to be erased yet.
+    /// Range that has not been checked yet.
     rest: Range<u32>,
 }
 
@@ -22,12 +22,13 @@ impl Erase {
         Erase { area, begun: 0, at_work: false, rest: area.start()..area.end() }
     }
 
-    /// Whether the flash was at work at the last step.
+    /// Whether the flash was erasing at the last step.
     pub(crate) fn is_at_work(&self) -> bool {
         self.at_work
     }
 
-    /// Whether all is erased. Sectors are never skipped because they read as erased: an erase that was cut can look like that.
+    /// Does one step; returns whether the area is erased. Sectors that read as erased are not skipped, because an erase
+    /// that was cut can look like that.
     pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         self.at_work = flash.is_busy().map_err(|_| Refusal::NotCleared)?;
         if self.at_work {

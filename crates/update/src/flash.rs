@@ -1,35 +1,35 @@
-//! What the update needs of a flash.
+//! The flash interface of the update.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::refusal::Refusal;
 
-/// A NOR flash with sectors of different sizes whose erase goes on by itself. `embedded_storage::NorFlash` can say
-/// neither: it has one `ERASE_SIZE`, and its `erase` returns when all is done.
+/// A NOR flash with sectors of different sizes whose erase runs in the background. `embedded_storage::NorFlash`
+/// supports neither: it has one `ERASE_SIZE`, and its `erase` returns only when the erase is done.
 ///
-/// Offsets count from the start of the flash. What is read is what the cells hold: a driver flushes the caches after it has
-/// programmed or erased, for everything is read back.
+/// Offsets count from the start of the flash. Reads must return the content of the cells: a driver flushes the caches
+/// after programming or erasing, because everything is read back.
 pub trait Flash: ReadNorFlash {
-    /// Bytes of a word, which the flash programs as one: 4 or 8.
+    /// Bytes of a word, the unit of programming: 4 or 8.
     fn word_size(&self) -> u32 {
         4
     }
 
-    /// Programs whole words at a multiple of their size. The words were erased before, or all of `bytes` are 0: zeros may
-    /// be programmed over anything. A word without check bits allows it because a bit may go from 1 to 0 without an erase
-    /// (RM0390, 3.5.2; RM0090, 3.6.3), a word with check bits as an exception (RM0440, 3.3.8).
+    /// Programs whole words at a multiple of their size. Either the words were erased before, or all of `bytes` are 0:
+    /// zeros may be programmed over anything. In a word without check bits this works because a bit may go from 1 to 0
+    /// without an erase (RM0390, 3.5.2; RM0090, 3.6.3); in a word with check bits it is an exception (RM0440, 3.3.8).
     ///
     /// # Errors
-    /// The flash reports that it did not program.
+    /// The flash reports that programming failed.
     fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error>;
 
-    /// Begins to erase the sector that starts at `offset`.
+    /// Starts the erase of the sector at `offset`.
     ///
     /// # Errors
-    /// The flash refuses to erase it.
+    /// The flash refuses the erase.
     fn start_erase(&mut self, offset: u32) -> Result<(), Self::Error>;
 
-    /// Whether an erase is still going on; the flash is not read or programmed meanwhile.
+    /// Whether an erase is in progress; the flash is not read or programmed during that time.
     ///
     /// # Errors
     /// The erase has ended and failed.
@@ -54,14 +54,15 @@ impl<F: Flash> Flash for &mut F {
     }
 }
 
-/// Bytes that are programmed in one step: 64 words, 1 ms (16 us a word) and 6.4 ms at most.
+/// Bytes programmed in one step: 64 words, 1 ms (16 us a word), at most 6.4 ms.
 pub(crate) const CHUNK: usize = CHUNK_LEN as usize;
-/// The same, as a distance in flash.
+/// The same number, as a distance in flash.
 pub(crate) const CHUNK_LEN: u32 = 256;
-/// Bytes that are read and checked in one step.
+/// Bytes read and checked in one step.
 pub(crate) const STEP: u32 = 4 * CHUNK_LEN;
 
-/// Hands `range` to `take` in pieces of at most [`CHUNK`] bytes, as far as one step goes. Returns where to go on.
+/// Gives `range` to `take` in pieces of at most [`CHUNK`] bytes, as far as one step goes. Returns the place to continue
+/// at.
 pub(crate) fn read_step<F: Flash>(
     flash: &mut F,
     range: core::ops::Range<u32>,
@@ -80,7 +81,7 @@ pub(crate) fn read_step<F: Flash>(
 }
 
 /// Whether all bytes have this value.
-#[inline(never)] // Many places, little room.
+#[inline(never)] // Many callers, and little room in flash.
 pub(crate) fn all_are(bytes: &[u8], value: u8) -> bool {
     bytes.iter().all(|byte| *byte == value)
 }
@@ -91,7 +92,7 @@ pub(crate) fn first(buffer: &mut [u8], len: u32) -> &mut [u8] {
     buffer.split_at_mut(len).0
 }
 
-/// Programs at most [`CHUNK`] bytes, and reads them back. What is left of the last word becomes as it is in an erased one.
+/// Programs at most [`CHUNK`] bytes, and reads them back. The rest of the last word gets the value of erased cells.
 pub(crate) fn program<F: Flash>(flash: &mut F, at: u32, bytes: &[u8]) -> Result<(), Refusal> {
     let mut buffer = [0xFF; CHUNK];
     buffer.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);

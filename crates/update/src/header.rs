@@ -1,4 +1,4 @@
-//! The image header: 512 bytes in front of the vector table, in flash as in the file that is downloaded.
+//! The image header: 512 bytes in front of the vector table, in flash and in the downloaded file.
 
 use core::fmt;
 
@@ -6,17 +6,17 @@ use crate::refusal::Refusal;
 
 /// Bytes of the header (region `IMAGE_HEADER` of memory.x).
 pub const HEADER_LEN: usize = HEADER as usize;
-/// The same, as a distance in flash.
+/// The same number, as a distance in flash.
 pub(crate) const HEADER: u32 = 512;
 /// Bytes of an Ed25519 signature.
 pub const SIGNATURE_LEN: usize = 64;
-/// Bytes of the header that are signed: all before the signature.
+/// Number of signed bytes of the header: all bytes before the signature.
 pub const SIGNED_LEN: usize = HEADER_LEN - SIGNATURE_LEN - CRC_LEN;
 const CRC_LEN: usize = 4;
 
 /// First word of every image, whatever its format.
 const MAGIC: u32 = u32::from_le_bytes(*b"CNFW");
-/// Keys that a header can name.
+/// Number of keys that a header can name.
 pub(crate) const MOST_KEYS: u32 = 8;
 /// The format that this crate reads and writes.
 const FORMAT: u32 = 1;
@@ -24,11 +24,11 @@ const FORMAT: u32 = 1;
 /// Version of an application.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
-    /// Changes that break.
+    /// Number for incompatible changes.
     pub major: u16,
-    /// Changes that add.
+    /// Number for compatible additions.
     pub minor: u16,
-    /// Changes that correct.
+    /// Number for corrections.
     pub patch: u16,
 }
 
@@ -38,26 +38,26 @@ impl fmt::Display for Version {
     }
 }
 
-/// What the maker of an image says of it.
+/// Properties of an image, set by its maker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Description {
-    /// The product that it is for, as in 1018h:2.
+    /// The product, as in 1018h:2.
     pub product: u32,
-    /// The hardware revisions that it runs on: bit n for revision n.
+    /// The hardware revisions on which the image runs: bit n for revision n.
     pub hardware: u32,
-    /// Its version, for people. Nothing is decided by it.
+    /// The version, for information only.
     pub version: Version,
-    /// Security counter: where an image has run, none with a lower counter is accepted. It grows only when an older image must
-    /// never run again.
+    /// Security counter: a node on which an image has run accepts no image with a lower counter. It is raised only when
+    /// older images must never run again.
     pub counter: u32,
-    /// The number of the key that it is signed with, 0 to 7: its place among the keys of the bootloader.
+    /// The number of the signing key, 0 to 7: its place among the keys of the bootloader.
     pub key: u8,
-    /// Keys that are revoked when it runs: bit n for key n. Its own key cannot be one of them.
+    /// Keys that are revoked when the image runs: bit n for key n. The image's own key must not be among them.
     pub revokes: u8,
 }
 
-/// The header of one image. A value of this type is always well-formed; whether it is for this node, and whether the
-/// signature is good, is decided elsewhere.
+/// The header of an image. A value of this type is always well-formed; whether the image is for this node, and whether
+/// its signature is valid, is checked elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     description: Description,
@@ -67,8 +67,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// The header of `code`, not signed yet. `None` when the code is empty or no whole number of words, which is
-    /// what flash is programmed in, or when it would revoke its own key.
+    /// The header of `code`, not signed yet. `None` if the code is empty or not a whole number of words (the unit of
+    /// programming), or if the image would revoke its own key.
     #[must_use]
     pub fn describe(description: Description, code: &[u8]) -> Option<Header> {
         let length = u32::try_from(code.len()).ok()?;
@@ -83,13 +83,13 @@ impl Header {
         Header { signature, ..self }
     }
 
-    /// What the maker says of the image.
+    /// Properties of the image.
     #[must_use]
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// Bytes of code after the header: a whole number of words, never 0.
+    /// Length of the code after the header in bytes: a whole number of words, never 0.
     #[must_use]
     pub fn length(&self) -> u32 {
         self.length
@@ -101,7 +101,7 @@ impl Header {
         self.code_crc
     }
 
-    /// The signature as it is in the header, good or not.
+    /// The signature in the header, valid or not.
     #[must_use]
     pub fn signature(&self) -> &[u8; SIGNATURE_LEN] {
         &self.signature
@@ -120,7 +120,7 @@ impl Header {
         bytes
     }
 
-    /// The CRC-32 at the end of the header, which covers all the rest of it.
+    /// The CRC-32 at the end of the header, over all other bytes of the header.
     #[must_use]
     pub fn crc(&self) -> u32 {
         let mut digest = checksum::begin();
@@ -129,7 +129,7 @@ impl Header {
         digest.finalize()
     }
 
-    /// The header as it is in flash.
+    /// The bytes of the header in flash.
     #[must_use]
     pub fn encode(&self) -> [u8; HEADER_LEN] {
         let mut bytes = [0; HEADER_LEN];
@@ -142,11 +142,11 @@ impl Header {
         bytes
     }
 
-    /// The header in `bytes`. Nothing is left open: exactly the bytes that [`Header::encode`] writes are accepted.
+    /// The header in `bytes`. Only the exact bytes that [`Header::encode`] writes are accepted.
     ///
     /// # Errors
-    /// [`Refusal::UnknownFormat`], [`Refusal::HeaderCrc`], or [`Refusal::HeaderContent`] when reserved bytes are not 0, the length is
-    /// none that an image can have, or the key is none or revokes itself.
+    /// [`Refusal::UnknownFormat`], [`Refusal::HeaderCrc`], or [`Refusal::HeaderContent`] if reserved bytes are not 0,
+    /// the length is impossible, or the key is impossible or revokes itself.
     pub fn parse(bytes: &[u8; HEADER_LEN]) -> Result<Header, Refusal> {
         let mut words = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word));
         let mut next = || words.next().unwrap_or_default();
@@ -172,7 +172,8 @@ impl Header {
         }
     }
 
-    /// Whether there is code, in whole words, and the key of the image is one that there can be and stays good.
+    /// Whether the code is a whole number of words and not empty, the key number is possible, and the image does not
+    /// revoke its own key.
     fn is_sensible(&self) -> bool {
         let Description { key, revokes, .. } = self.description;
         let is_length = self.length != 0 && self.length.is_multiple_of(4);

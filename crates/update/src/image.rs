@@ -1,4 +1,4 @@
-//! An image in flash: its header, and the checks of its code in steps.
+//! An image in flash: its header, and the stepwise checks of its code.
 
 use core::ops::Range;
 
@@ -19,27 +19,27 @@ pub(crate) fn header<F: Flash>(flash: &mut F, area: Area) -> Result<Header, Refu
     Header::parse(&bytes)
 }
 
-/// The header at the start of `area`, when the image may run on this node if the rest of it is good.
+/// The header at the start of `area`, if the image may run on this node, provided that the rest of it is valid.
 pub(crate) fn admitted<F: Flash>(flash: &mut F, target: &Target, area: Area) -> Result<Header, Refusal> {
     let header = header(flash, area)?;
     target.admit(flash, &header).map(|()| header)
 }
 
-/// Where the code of an image in `area` is.
+/// Range of the code of an image in `area`.
 pub(crate) fn code(header: &Header, area: Area) -> Range<u32> {
     let start = area.start();
     start.saturating_add(HEADER)..start.saturating_add(image_len(header))
 }
 
-/// The header of the staged image, when it may take the place of the application: it may run on this node, and its security counter
-/// is not lower than that of the application, which may not have been noted yet.
+/// The header of the staged image, if it may replace the application: it may run on this node, and its security counter
+/// is not lower than the application's, which may not have been recorded yet.
 pub(crate) fn candidate<F: Flash>(flash: &mut F, target: &Target) -> Result<Header, Refusal> {
     let staged = admitted(flash, target, target.layout.staging())?;
     let least = header(flash, target.layout.application()).map_or(0, |header| header.description().counter);
     if staged.description().counter < least { Err(Refusal::Counter { least }) } else { Ok(staged) }
 }
 
-/// A check of the CRC under way.
+/// A CRC check in progress.
 #[derive(Clone)]
 pub(crate) struct CrcCheck {
     expected: u32,
@@ -52,7 +52,7 @@ impl CrcCheck {
         CrcCheck { expected: header.code_crc(), rest: code(header, area), digest: checksum::begin() }
     }
 
-    /// Whether all has been seen; only then the CRC is judged.
+    /// Does one step; returns whether the check is complete. The CRC is judged only at the end.
     pub(crate) fn step<F: Flash>(
         &mut self,
         flash: &mut F,
@@ -69,38 +69,39 @@ impl CrcCheck {
     }
 }
 
-/// A check of everything that can be said of an image under way: what is in it, then who has signed it. The signature is looked at
-/// twice, from the hash of the image on: one instruction that is left out, or one wrong bit, spoils one of the two only.
+/// A full check of an image in progress: first its content, then its signature. The signature is verified twice,
+/// starting from the hash of the image, so that a single skipped instruction or wrong bit spoils only one of the two
+/// verifications.
 pub(crate) struct FullCheck {
     header: Header,
     crc: CrcCheck,
-    /// `None` where the signature does not matter.
+    /// `None` if the signature is not checked.
     message: Option<Message>,
     hash: [u8; HASH_LEN],
     signature: Option<Verification>,
-    /// The word of the first look at the signature.
+    /// The word of the first verification.
     first: Option<u32>,
 }
 
 impl FullCheck {
-    /// Of the staged image.
+    /// A check of the staged image.
     pub(crate) fn new<F: Flash>(flash: &mut F, target: &Target) -> Result<FullCheck, Refusal> {
         Ok(FullCheck::of(candidate(flash, target)?, target.layout.staging()))
     }
 
-    /// Of the image with this header in an area.
+    /// A check of the image with this header in an area.
     pub(crate) fn of(header: Header, area: Area) -> FullCheck {
         let crc = CrcCheck::new(&header, area);
         let message = Some(Message::of(&header));
         FullCheck { header, crc, message, hash: [0; HASH_LEN], signature: None, first: None }
     }
 
-    /// The same without the signature.
+    /// The same check without the signature.
     pub(crate) fn of_sum(header: Header, area: Area) -> FullCheck {
         FullCheck { message: None, ..FullCheck::of(header, area) }
     }
 
-    /// The header, once all is known to be good.
+    /// Does one step; returns the header once the whole check has passed.
     pub(crate) fn step<F: Flash>(
         &mut self,
         flash: &mut F,
@@ -118,8 +119,9 @@ impl FullCheck {
         }
     }
 
-    /// The CRC of the header once both looks have found the signature to be good; another word before, and with any other signature.
-    /// The key of the look is compared with the one that is looked up here, as the two looks may have had the same wrong one.
+    /// The CRC of the header once both verifications have found the signature valid; another word before that, and with
+    /// any other signature. The key of the verification is compared with the key looked up here, because both
+    /// verifications may have used the same wrong key.
     pub(crate) fn seal(&self, target: &Target) -> u32 {
         let (Some(signature), Some(first)) = (&self.signature, self.first) else { return 0 };
         let Some(key) = target.key_of(&self.header) else { return 0 };
@@ -136,7 +138,7 @@ impl FullCheck {
         self.verify(target)
     }
 
-    /// Begins a look at the signature.
+    /// Starts a verification of the signature.
     fn verify(&mut self, target: &Target) -> Result<Option<Header>, Refusal> {
         let (signature, key) = (self.header.signature(), target.key_of(&self.header));
         self.signature = key.and_then(|key| Verification::new(&self.hash, CONTEXT, signature, key));

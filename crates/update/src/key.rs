@@ -1,24 +1,25 @@
-//! The keys that images are signed with: their public halves, as the build of the bootloader was given them.
+//! The public keys that images are signed with, as given to the build of the bootloader.
 //!
-//! `cargo xtask sign key` makes a pair and prints the variable to build the bootloader with; docs/update.md says how to keep the
-//! secret half, and what the second key is for.
+//! `cargo xtask sign key` makes a key pair and prints the variable for the build of the bootloader; docs/update.md
+//! describes how to keep the secret half, and the purpose of the second key.
 
 /// Bytes of an Ed25519 public key.
 pub const KEY_LEN: usize = 32;
 
 /// The public half of the DEVELOPMENT key. Its secret half is in the repository
-/// (`tools/sign/keys/DEVELOPMENT-KEY-KNOWN-TO-EVERYBODY.pem`): a node that trusts it runs what anybody signs.
+/// (`tools/sign/keys/DEVELOPMENT-KEY-KNOWN-TO-EVERYBODY.pem`), so a node that trusts this key runs images signed by
+/// anybody.
 pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [
     0xFB, 0x87, 0x4B, 0xC8, 0xD1, 0x9E, 0xEB, 0x05, 0xB1, 0x01, 0x6F, 0x27, 0xC2, 0x7C, 0xCD, 0x9E, 0x98,
     0x53, 0x25, 0xCA, 0x80, 0xD8, 0x06, 0x8B, 0xDA, 0x9B, 0x5F, 0x44, 0xA3, 0x9F, 0xE4, 0x66,
 ];
 
-/// Keys that a bootloader trusts.
+/// Number of keys that a bootloader trusts.
 pub const KEYS: usize = 2;
 
-/// The keys that this bootloader trusts, by their number: what the variables `UPDATE_PUBLIC_KEY` and `UPDATE_PUBLIC_KEY_2` say when the
-/// bootloader is built, 64 hexadecimal digits each. Without the second variable, key 1 is the same as key 0; without the first,
-/// key 0 is the development key.
+/// The keys that this bootloader trusts, by their number: 64 hexadecimal digits each, in the variables
+/// `UPDATE_PUBLIC_KEY` and `UPDATE_PUBLIC_KEY_2` when the bootloader is built. Without the second variable, key 1 is
+/// the same as key 0; without the first, key 0 is the development key.
 pub static PUBLIC_KEYS: [[u8; KEY_LEN]; KEYS] = [FIRST, SECOND];
 
 const FIRST: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY") {
@@ -34,7 +35,7 @@ const SECOND: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY_2") {
 pub const HAS_DEVELOPMENT_KEY: bool = is_same(&FIRST, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY)
     || is_same(&SECOND, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
 
-/// The key of these digits, for the compiler: anything else than 64 hexadecimal digits ends the build.
+/// The key with these digits, evaluated at compile time: anything but 64 hexadecimal digits stops the build.
 #[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
 pub(crate) const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
     assert!(digits.len() == 2 * KEY_LEN, "a key is not 64 hexadecimal digits");
@@ -56,7 +57,7 @@ const fn nibble(digit: u8) -> u8 {
     }
 }
 
-/// `==` of arrays, for the compiler.
+/// `==` of arrays at compile time.
 const fn is_same(mut a: &[u8], mut b: &[u8]) -> bool {
     while let ([x, rest_of_a @ ..], [y, rest_of_b @ ..]) = (a, b) {
         if *x != *y {

@@ -1,13 +1,13 @@
-//! Field update of the application over CAN (CiA 302-3), safe against a power cut at any moment and against images that
-//! are damaged, for another device, too old, or not signed. docs/update.md has the format of an image, the states, and
-//! what a cut at each point does.
+//! Field update of the application over CAN (CiA 302-3), safe against a power cut at any moment, and against images
+//! that are damaged, for another device, too old, or not signed. docs/update.md describes the format of an image, the
+//! states, and the effect of a cut at each point.
 //!
-//! The bootloader asks [`boot`] at every start, and gives an [`Updater`] the commands of the master and a [`Flash`]:
+//! The bootloader calls [`boot`] at every start, and gives an [`Updater`] the commands of the master and a [`Flash`]:
 //!
 //! ```
 //! use update::{Decision, Flash, Header, Next, Start, Status, Stay, Target, Updater, boot};
 //!
-//! /// What a bootloader does at a start: the application to be started, or what 1F57h reads while it stays.
+//! /// The decision at a start: the application to be started, or the value of 1F57h while the bootloader stays.
 //! fn decide<F: Flash>(flash: &mut F, target: Target, start: Start) -> Result<Header, Status> {
 //!     let decision = boot(flash, &target, start);
 //!     if matches!(decision, Decision::Copy | Decision::Revert) {
@@ -31,9 +31,9 @@
 //! |---|---|---|
 //! | 1F51h = 3 | [`Updater::clear`], then [`Updater::poll`] | busy, then 0 |
 //! | download to 1F50h begins | [`Updater::begin`] | 0, or 4 without a clear before |
-//! | its bytes | [`Updater::receive`] | 0, or why the header is refused |
-//! | it ends | [`Updater::finish`], then [`Updater::poll`] | busy while it is checked, then 0 or why it is refused |
-//! | 1F51h = 1, or at once | [`Updater::install`], then [`Updater::poll`], then [`boot`] | busy while it is copied, then 0 |
+//! | bytes of the download | [`Updater::receive`] | 0, or the refusal of the header |
+//! | end of the download | [`Updater::finish`], then [`Updater::poll`] | busy during the check, then 0 or the refusal |
+//! | 1F51h = 1, or at once | [`Updater::install`], [`Updater::poll`], then [`boot`] | busy during the copy, then 0 |
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
@@ -55,6 +55,7 @@ mod authorisation;
 mod boot;
 mod copy;
 mod crashes;
+mod download;
 mod erase;
 mod flash;
 mod header;
@@ -62,7 +63,6 @@ mod image;
 pub mod key;
 #[cfg(feature = "mock")]
 pub mod mock;
-mod receive;
 mod record;
 mod refusal;
 mod seal;

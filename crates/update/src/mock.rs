@@ -1,4 +1,4 @@
-//! A flash for tests: sectors of different sizes, words of four or eight bytes, and an erase that takes its time.
+//! A flash for tests: sectors of different sizes, words of four or eight bytes, and an erase that takes several polls.
 
 use core::ops::{Deref, DerefMut, Range};
 use std::vec::Vec;
@@ -10,10 +10,10 @@ use crate::flash::Flash;
 
 pub use cells::{PowerCut, Weak};
 
-/// Polls that an erase takes.
+/// Number of polls that an erase takes.
 const ERASE_POLLS: u32 = 3;
 
-/// A flash whose [`Cells`] say how the power is cut.
+/// A flash whose [`Cells`] define the power cuts.
 #[derive(Clone, Debug)]
 pub struct MockFlash {
     cells: Cells,
@@ -23,13 +23,13 @@ pub struct MockFlash {
 }
 
 impl MockFlash {
-    /// An erased flash with sectors of these sizes in bytes. `seed` decides how random weak bits read.
+    /// An erased flash with sectors of these sizes in bytes. `seed` determines how random weak bits read.
     #[must_use]
     pub fn new(sectors: &[usize], seed: u64) -> MockFlash {
         MockFlash::with_words(sectors, WORD, seed)
     }
 
-    /// The same in words of `word` bytes, 4 or 8.
+    /// The same flash with words of `word` bytes, 4 or 8.
     #[must_use]
     pub fn with_words(sectors: &[usize], word: usize, seed: u64) -> MockFlash {
         let mut end = 0;
@@ -42,13 +42,13 @@ impl MockFlash {
         MockFlash { sectors: sectors_of, cells, word, busy: 0 }
     }
 
-    /// Power again, and no cut to come.
+    /// Switches the power on, without a further cut.
     pub fn power_up(&mut self) {
         self.busy = 0;
         self.cells.power_up();
     }
 
-    /// Neither reads nor programs while it erases.
+    /// Checks that no erase is in progress, because the flash can then neither be read nor programmed.
     fn ready(&self) -> Result<(), PowerCut> {
         self.cells.check_power()?;
         assert_eq!(self.busy, 0, "the flash erases");

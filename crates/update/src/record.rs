@@ -1,45 +1,49 @@
-//! The record in the last bytes of staging, and of the same form in the last bytes of the kept image.
+//! The record in the last bytes of staging, and a record of the same form in the last bytes of the kept image.
 //!
-//! | place | in staging: whether the image there is to be copied | beside the kept image: whether it may have to come back |
+//! | place | in staging | in the area of the kept image |
 //! |---|---|---|
-//! | eight bytes | magic, programmed when the staged image has passed every check | the same when the copy of the application is whole |
-//! | a word | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied | 0: the same; from this word on there is a way back |
-//! | a word | 0: it was copied, and need not be again while the application is whole | 0: the way back is not needed any more |
+//! | eight bytes | magic: the staged image has passed every check | magic: the copy of the application is complete |
+//! | a word | 0: the magic is complete, and the image is pending to be copied | 0: the magic is complete |
+//! | a word | 0: the image was copied | 0: the kept image is no longer needed |
 //!
-//! A word is what the flash programs as one, 4 or 8 bytes. The two words that decide are zeros, because zeros may be programmed once more over a word that a cut left half
-//! programmed, and then hold for good. To revoke is to program zeros over everything, the last word first: it comes before
-//! every erase of the area, so no erase that is cut can bring a record back.
+//! The second place proves that the magic does not read well after a cut only by chance. From this word on the staged
+//! image must be copied, and the kept image can be restored.
+//!
+//! A word is the unit of programming, 4 or 8 bytes. The two words that decide are zeros, because zeros may be
+//! programmed once more over a word that a cut left half programmed, and are then final. To revoke a record, zeros are
+//! programmed over all of it, the last word first. This comes before every erase of the area, so an erase that is cut
+//! cannot bring a record back.
 
 use crate::flash::{Flash, all_are, first, program};
 use crate::refusal::Refusal;
 
-/// Bytes at the end of the area that belong to the record, and to the marks of the trial ([`crate::Trial`]).
+/// Bytes at the end of the area for the record and for the marks of the trial ([`crate::Trial`]).
 pub(crate) const RECORD_ROOM: u32 = 512;
-/// Bytes of the longest record, that of a flash with words of 8 bytes.
+/// Length of the longest record in bytes: with words of 8 bytes.
 const RECORD_LEN: usize = 24;
 
 const MAGIC: [u8; 8] = *b"COPYTHIS";
 const MAGIC_LEN: u32 = 8;
 
-/// What the record says.
+/// State of the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Commit {
-    /// There is nothing to be done.
+    /// Nothing is to be done.
     None,
-    /// The record was cut; it does not count, but its words may read otherwise next time.
+    /// The record was cut. It does not count, but its words may read differently next time.
     Torn,
-    /// The image is to be copied, or may have to be.
+    /// The image is to be copied, or may have to be copied.
     Pending,
-    /// The image was dealt with, and is still there.
+    /// The image is no longer needed, but is still there.
     Done,
 }
 
-/// The record, by the offset at which its area ends.
+/// The record, identified by the end of its area as an offset.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record(pub(crate) u32);
 
 impl Record {
-    /// What the record says. A flash that cannot be read holds nothing.
+    /// The state of the record. A flash that cannot be read counts as empty.
     pub(crate) fn read<F: Flash>(self, flash: &mut F) -> Commit {
         let word = flash.word_size();
         let mut bytes = [0; RECORD_LEN];
@@ -57,27 +61,27 @@ impl Record {
         }
     }
 
-    /// The image is whole, and pending.
+    /// Marks the image as complete and pending.
     pub(crate) fn write<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         let start = self.start(flash.word_size());
         program(flash, start, &MAGIC)?;
         self.close(flash)
     }
 
-    /// Makes a record that reads as pending hold for good.
+    /// Makes a record that reads as pending final.
     pub(crate) fn close<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         let word = flash.word_size();
         mark(flash, self.start(word).saturating_add(MAGIC_LEN))
     }
 
-    /// The image is not pending any more.
+    /// Marks the image as no longer pending.
     pub(crate) fn done<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         let word = flash.word_size();
         mark(flash, self.0.saturating_sub(word))
     }
 
-    /// Nothing is to be copied, for good. First the record says that there is no need: were the magic cut before that, it
-    /// could read well, a copy begin, and the magic be gone in the middle of it.
+    /// Revokes the record for good. It is first marked as done: if the magic were cut without this mark, it could read
+    /// well, a copy could begin, and the magic could vanish during the copy.
     pub(crate) fn revoke<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         self.done(flash)?;
         let word = flash.word_size();
@@ -89,7 +93,7 @@ impl Record {
     }
 }
 
-/// Bytes of a record in a flash with words of so many bytes.
+/// Length of a record in bytes, in a flash with words of `word` bytes.
 fn len(word: u32) -> u32 {
     MAGIC_LEN.saturating_add(word).saturating_add(word).min(RECORD_ROOM)
 }
@@ -100,7 +104,7 @@ pub(crate) fn mark<F: Flash>(flash: &mut F, at: u32) -> Result<(), Refusal> {
     program(flash, at, first(&mut [0; 8], word))
 }
 
-/// Whether there is a word of zeros.
+/// Whether the word at `at` is zero.
 pub(crate) fn is_zero<F: Flash>(flash: &mut F, at: u32) -> Result<bool, Refusal> {
     let mut word = [0xFF; 4];
     flash.read(at, &mut word).map_err(|_| Refusal::Unspecified)?;

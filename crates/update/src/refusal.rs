@@ -1,24 +1,24 @@
-//! Why an image or a command is refused, and the code of each reason in 1F57h.
+//! Reasons to refuse an image or a command, with their codes in 1F57h.
 
 use crate::status::Status;
 use crate::trial::Reason;
 
-/// Why there is no update, or no start.
+/// Why there is no update or no start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// The application area holds nothing that may be started.
+    /// The application area holds no image that may be started.
     NoProgram,
-    /// The magic number or the format is none that this bootloader knows.
+    /// The magic number or the format is unknown to this bootloader.
     UnknownFormat,
     /// The CRC of the header is wrong.
     HeaderCrc,
-    /// The CRC of the header is right, its content is not.
+    /// The CRC of the header is right, but its content is invalid.
     HeaderContent,
     /// The CRC of the code is wrong.
     CodeCrc,
-    /// The memory was not cleared before the download, or does not erase.
+    /// The memory was not cleared before the download, or cannot be erased.
     NotCleared,
-    /// The flash does not hold what was programmed.
+    /// The flash does not hold the programmed data.
     Write,
     /// The image is longer than the application area.
     TooLong,
@@ -34,36 +34,37 @@ pub enum Refusal {
         /// The revision of this node.
         revision: u8,
     },
-    /// The security counter of the image is lower than that of one that has run, or of the application in place.
+    /// The security counter of the image is lower than that of an image that has run, or than that of the present
+    /// application.
     Counter {
-        /// The lowest that is accepted.
+        /// The lowest accepted counter.
         least: u32,
     },
-    /// The key that the image is signed with was revoked.
+    /// The signing key of the image has been revoked.
     Revoked {
-        /// Its number.
+        /// Number of the key.
         key: u8,
     },
-    /// The signature does not belong to this image and the key of this node.
+    /// The signature is not valid for this image and the key of this node.
     Signature,
     /// The download ended before the image did.
     Truncated,
-    /// The download went on after the end of the image.
+    /// The download continued after the end of the image.
     Excess,
     /// The application has crashed too often without confirming itself.
     Crashes {
-        /// How often.
+        /// Number of crashes.
         count: u8,
     },
-    /// The application has failed its trial, and the one before is back.
+    /// The application has failed its trial, and the previous image was restored.
     TakenBack {
-        /// Why.
+        /// Cause of the failure.
         reason: Reason,
     },
 }
 
 impl Refusal {
-    /// The code in bits 1 to 7 of 1F57h. CiA 302-3 leaves those above 63 to the manufacturer.
+    /// The code in bits 1 to 7 of 1F57h. CiA 302-3 leaves codes above 63 to the manufacturer.
     #[must_use]
     pub fn code(self) -> u8 {
         match self {
@@ -86,7 +87,7 @@ impl Refusal {
         }
     }
 
-    /// What bits 16 to 31 of 1F57h say besides: what the node expects (its low 16 bits), or a count.
+    /// Bits 16 to 31 of 1F57h: the value that the node expects (its low 16 bits), or a count.
     #[must_use]
     pub fn detail(self) -> u16 {
         match self {

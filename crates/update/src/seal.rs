@@ -1,15 +1,16 @@
-//! The seal: a word that comes out of the equation of the signature, and without which no application starts.
+//! The seal: a word that results from the equation of the signature, and without which no application starts.
 //!
-//! A processor that a dip of its supply has made leave out one instruction may take any one branch the wrong way. So the branches are
-//! not all: the verification leaves a word in which the CRC of the header and the result of the equation are mixed. The word is
-//! kept until the start, and there it is mixed into the address at which the application begins. With a signature that is not
-//! good, or where none was verified, that address is not the application's, whatever the branches said.
+//! A dip of the supply voltage can make a processor skip one instruction, so any single branch may go the wrong way.
+//! The decision therefore does not depend on branches alone: the verification leaves a word that combines the CRC of
+//! the header with the result of the equation. The word is kept until the start, where it is combined with the start
+//! address of the application. With an invalid signature, or without a verification, the resulting address is not that
+//! of the application, whatever the branches have decided.
 
 use core::hint::black_box;
 
-/// The CRC of a header, when the signature of the image is good; with any other signature another word.
+/// The CRC of a header, if the signature of the image is valid; another word with any other signature.
 pub(crate) fn seal(crc: u32, found: &[u8; 32], expected: &[u8; 32]) -> u32 {
-    // The compiler must not know what a comparison before has found.
+    // Keeps the compiler from using the result of an earlier comparison.
     let (found, expected) = (black_box(found).as_chunks().0, black_box(expected).as_chunks().0);
     let differences = found.iter().zip(expected);
     differences.fold(crc, |seal, (a, b)| seal.wrapping_add(u32::from_le_bytes(*a) ^ u32::from_le_bytes(*b)))

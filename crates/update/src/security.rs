@@ -1,15 +1,15 @@
 //! The least security counter and the revoked keys, which no image may undo. They have an area of their own, which is
 //! programmed and never erased: a bit that is 0 stays 0, so the counter only rises and a key stays revoked.
 //!
-//! | mark | it is set |
+//! | mark | meaning if set |
 //! |---|---|
-//! | 0 to 7 | key number so much is revoked |
-//! | 7 + n | an image with the security counter n has run: no image with a lower one runs again |
+//! | 0 to 7 | the key with this number is revoked |
+//! | 7 + n | an image with the security counter n has run, so no image with a lower counter may run |
 //!
-//! A mark is set when either of its two words is 0; the second word lies half the area behind the first. The counter is the place of the
-//! highest mark, so one step takes one mark, however far it goes. A word that a power cut left half programmed may read as 0
-//! or not. Either is right at that time, as the image that asks for the mark is there and asks again at the next start, and
-//! zeros may be programmed once more over such a word.
+//! A mark is set if either of its two words is 0; the second word is half the area behind the first. The counter is the
+//! place of the highest mark, so a step of any size needs one mark only. A word that a power cut left half programmed
+//! may read as 0 or not. Both results are acceptable, because the image that needs the mark is still there and sets it
+//! again at the next start, and zeros may be programmed once more over such a word.
 
 use crate::area::Area;
 use crate::flash::Flash;
@@ -17,20 +17,20 @@ use crate::header::{Description, Header, MOST_KEYS};
 use crate::record::{is_zero, mark};
 use crate::refusal::Refusal;
 
-/// Room of a mark in either half: a word of whatever size.
+/// Room for a mark in each half: a word of any size.
 const ROOM: u32 = 8;
 
-/// The area.
+/// The area of the marks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Security(pub(crate) Area);
 
 impl Security {
-    /// The highest counter that there is a mark for.
+    /// The highest counter that has a mark.
     pub(crate) const fn highest_counter(self) -> u32 {
         (self.half() / ROOM).saturating_sub(MOST_KEYS)
     }
 
-    /// Whether an image with this header may run: its counter is not too low, and its key not revoked.
+    /// Whether an image with this header may run: its counter is not too low, and its key is not revoked.
     pub(crate) fn admit<F: Flash>(self, flash: &mut F, about: &Description) -> Result<(), Refusal> {
         let least = self.least_counter(flash)?;
         if about.counter < least {
@@ -42,7 +42,8 @@ impl Security {
         }
     }
 
-    /// The image with this header runs: no older one may do so again, nor one with a key that this image revokes.
+    /// Records that the image with this header runs: older images are refused from now on, and so are the keys that it
+    /// revokes.
     pub(crate) fn note<F: Flash>(self, flash: &mut F, header: &Header) -> Result<(), Refusal> {
         let about = header.description();
         for key in (0..MOST_KEYS).filter(|key| about.revokes.checked_shr(*key).unwrap_or(0) & 1 != 0) {
@@ -63,7 +64,7 @@ impl Security {
         self.0.size() / 2
     }
 
-    /// Where the two words of a mark are.
+    /// The places of the two words of a mark.
     fn places(self, mark: u32) -> [u32; 2] {
         let place = self.0.start().saturating_add(mark.saturating_mul(ROOM));
         [place, place.saturating_add(self.half())]
@@ -77,7 +78,7 @@ impl Security {
         Ok(is_set)
     }
 
-    /// Sets both words, where they are not: one of them may have been cut.
+    /// Sets both words, unless they are set already: one of them may have been cut.
     fn set<F: Flash>(self, flash: &mut F, number: u32) -> Result<(), Refusal> {
         for place in self.places(number) {
             if !is_zero(flash, place)? {
@@ -140,7 +141,7 @@ mod tests {
         assert_eq!(least(&mut flash), 0);
     }
 
-    /// Whatever bit of the area loses its charge or gains one, the counter is lost only when both words of its mark are.
+    /// Any single damaged bit in the area is harmless: the counter is lost only if both words of its mark are damaged.
     #[test]
     fn one_damaged_word_lowers_nothing() {
         let mut flash = MockFlash::new(&[512], 1);
@@ -154,8 +155,8 @@ mod tests {
         }
     }
 
-    /// The power goes at each operation, in each way, and again at each operation of the start that follows. The counter is never
-    /// lower than it was, and the start after that has it where it was to be.
+    /// Power cuts at each operation, in each way, and again at each operation of the next start. The counter is never
+    /// lower than before, and the start after that has the intended counter.
     #[test]
     fn after_a_cut_anywhere_nothing_is_undone() {
         let new = header(9, 1, 1);

@@ -1,13 +1,14 @@
 //! The signature of an image: Ed25519ph (RFC 8032, 5.1) over the signed part of the header and the code.
 //!
-//! It is the variant with the hash in front because that can be made in small steps, and so is the rest: the equation of
-//! RFC 8032, 5.1.7 is gone through eight bits at a time, so that the bus is served between. The context keeps a signature
-//! that the same key made for something else from being one of an image.
+//! This is the variant with a prehash, because the hash can be computed in small steps. The rest can too: the equation
+//! of RFC 8032, 5.1.7 is computed eight bits at a time, so that the bus is served in between. The context prevents that
+//! a signature made with the same key for another purpose is valid for an image.
 //!
-//! The hash is that of `sha2`, whose indices the compiler can prove. The arithmetic of points is that of `salty` (Apache-2.0 or
-//! MIT; assembly on a Cortex-M4, plain Rust elsewhere). Its own `verify_prehashed` judges the same, as the tests show, but in one piece of 4.3 million instructions, and takes
-//! 3 KB more of flash: it multiplies with ladders that hide the numbers, of which none is secret here, and brings the
-//! hash modulo the order of the curve first, which the RFC does not ask for.
+//! The hash is that of `sha2`, whose indices the compiler can prove. The arithmetic of points is that of `salty`
+//! (Apache-2.0 or MIT; assembly on a Cortex-M4, plain Rust elsewhere). The function `verify_prehashed` of `salty` gives
+//! the same results, as the tests show, but in one piece of 4.3 million instructions and with 3 KB more flash: it
+//! multiplies with ladders that hide the numbers, although none is secret here, and first reduces the hash modulo the
+//! order of the curve, which the RFC does not require.
 
 use core::ops::{Add, Neg};
 
@@ -21,21 +22,21 @@ use crate::seal::seal;
 /// Context of the signature (RFC 8032, 5.1: the octet string C).
 pub const CONTEXT: &[u8] = b"CANopen node image 1";
 
-/// What was signed, as far as it was seen.
+/// The signed bytes hashed so far.
 pub(crate) struct Message(Sha512);
 
 impl Message {
-    /// Begins with the header.
+    /// Begins with the signed part of the header.
     pub(crate) fn of(header: &Header) -> Message {
         Message(Sha512::new_with_prefix(header.signed_part()))
     }
 
-    /// Goes on with code.
+    /// Adds code.
     pub(crate) fn add(&mut self, code: &[u8]) {
         self.0.update(code);
     }
 
-    /// The hash of all that was added; the message is empty again.
+    /// The hash of all added bytes; the message is empty again.
     pub(crate) fn end(&mut self) -> [u8; HASH_LEN] {
         self.0.finalize_reset().into()
     }
@@ -45,11 +46,11 @@ impl Message {
 pub(crate) const HASH_LEN: usize = 64;
 /// Bytes of a number or a point.
 const LEN: usize = 32;
-/// The octets before what is hashed (RFC 8032, 2: dom2), then phflag, then the length of the context.
+/// The octets before the hashed data (RFC 8032, 2: dom2), then phflag, then the length of the context.
 const DOMAIN: &[u8] = b"SigEd25519 no Ed25519 collisions\x01";
 
-/// A signature, a point R and a number S, of which it is to be found out whether \[S\]B = R + \[k\]A: B is the base point, A
-/// the key, and k a hash of everything. R is what \[S\]B - \[k\]A must come to.
+/// The verification of a signature, which consists of a point R and a number S: whether \[S\]B = R + \[k\]A, where B is
+/// the base point, A the key, and k a hash of everything. \[S\]B - \[k\]A is computed and compared with R.
 pub(crate) struct Verification {
     r: [u8; LEN],
     s: [u8; LEN],
@@ -57,17 +58,17 @@ pub(crate) struct Verification {
     key: [u8; KEY_LEN],
     /// -A.
     minus_key: EdwardsPoint,
-    /// Of the bits that were gone through, the highest first.
+    /// The sum over the bits processed so far, the highest bits first.
     sum: EdwardsPoint,
-    /// Bytes of the two numbers that were not.
+    /// Number of bytes of the two numbers that are not processed yet.
     rest: usize,
-    /// \[S\]B - \[k\]A after the last step, compressed: the R that would fit the signature. Zeros before.
+    /// \[S\]B - \[k\]A after the last step, compressed: the R that would make the signature valid. Zeros before.
     found: [u8; LEN],
 }
 
 impl Verification {
-    /// Begins to verify the signature of a message with this hash. `None` when the signature cannot be good: S is not reduced, or the
-    /// key is no point.
+    /// Starts to verify the signature of a message with this hash. `None` if the signature cannot be valid: S is not
+    /// reduced, or the key is not a point.
     pub(crate) fn new(
         hash: &[u8; HASH_LEN],
         context: &[u8],
@@ -96,7 +97,8 @@ impl Verification {
         is_reduced(&s).then_some(new)
     }
 
-    /// One step of 65: a byte of the numbers, then the comparison. Whether the signature is good, after the last of them.
+    /// Does one step of 65: a byte of the numbers, or finally the comparison. Returns whether the signature is valid
+    /// after the last step.
     pub(crate) fn step(&mut self) -> Option<bool> {
         if let Some(at) = self.rest.checked_sub(1) {
             self.rest = at;
@@ -108,17 +110,17 @@ impl Verification {
         }
     }
 
-    /// After the last step, the same verdict as a word: see [`seal`].
+    /// The result as a word, after the last step: see [`seal`].
     pub(crate) fn seal(&self, crc: u32) -> u32 {
         seal(crc, &self.found, &self.r)
     }
 
-    /// The key that this is about.
+    /// The key used for the verification.
     pub(crate) fn key(&self) -> &[u8; KEY_LEN] {
         &self.key
     }
 
-    /// Doubles and adds. S has no bits beyond its 32 bytes.
+    /// Doubles and adds for one byte of the numbers. S has no bits beyond its 32 bytes.
     fn add_byte(&mut self, at: usize) {
         let [k, s] = [self.k.get(at), self.s.get(at)].map(|byte| byte.copied().unwrap_or(0));
         let base = EdwardsPoint::basepoint();
@@ -139,7 +141,8 @@ const ORDER: [u8; LEN] = [
     0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x10,
 ];
 
-/// Whether S is below the order (RFC 8032, 5.1.7): else everybody could make another signature of what was signed.
+/// Whether S is below the order (RFC 8032, 5.1.7): otherwise anybody could make another valid signature of the same
+/// message.
 fn is_reduced(s: &[u8; LEN]) -> bool {
     s.iter().rev().lt(ORDER.iter().rev())
 }
@@ -160,7 +163,7 @@ mod tests {
         verification.is_some_and(|mut it| (0..=HASH_LEN).find_map(|_| it.step()).unwrap())
     }
 
-    /// What the library says in one piece.
+    /// The result of the library, computed in one piece.
     fn is_good_to_salty(hash: &[u8; 64], signature: &[u8; SIGNATURE_LEN], key: &[u8; KEY_LEN]) -> bool {
         let signature = Signature::from(signature);
         PublicKey::try_from(key)
@@ -171,7 +174,7 @@ mod tests {
         core::array::from_fn(|at| u8::from_str_radix(&hex[2 * at..][..2], 16).unwrap())
     }
 
-    /// RFC 8032, 7.3.
+    /// Test vector of RFC 8032, 7.3.
     #[test]
     fn the_signature_of_abc_is_good() {
         let key = bytes("ec172b93ad5e563bf4932c70e1245034c35467ef2efd4d64ebf819683467e2bf");
@@ -217,7 +220,7 @@ mod tests {
         }
     }
 
-    /// The library takes it: adding the order to S changes nothing in the equation.
+    /// The library accepts it, because adding the order to S changes nothing in the equation.
     #[test]
     fn a_signature_whose_s_is_not_reduced_is_refused() {
         let keys = Keypair::from(&[3; 32]);

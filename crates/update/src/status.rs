@@ -1,27 +1,27 @@
-//! The flash status, 1F57h (CiA 302-3): a word for the bus, words for people.
+//! The flash status, 1F57h (CiA 302-3): a word for the bus, text for people.
 
 use core::fmt;
 
 use crate::refusal::Refusal;
 
-/// Object 1F57h:1. While it is busy the code says nothing yet.
+/// Object 1F57h:1. The code is meaningless while the node is busy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// The flash is being erased, programmed or checked.
     pub busy: bool,
-    /// What came of it: 0 for good. 7 bits.
+    /// Result code of 7 bits: 0 for success.
     pub code: u8,
-    /// What the code says besides; see [`Refusal::detail`].
+    /// Detail of the code; see [`Refusal::detail`].
     pub detail: u16,
 }
 
 impl Status {
-    /// Nothing to do and nothing wrong: a word of 0.
+    /// No command in progress, and no error: a word of 0.
     pub const GOOD: Status = Status { busy: false, code: 0, detail: 0 };
-    /// Busy.
+    /// An operation is in progress.
     pub const BUSY: Status = Status { busy: true, code: 0, detail: 0 };
 
-    /// Refused.
+    /// A refused image or command.
     #[must_use]
     pub fn refused(refusal: Refusal) -> Status {
         Status { busy: false, code: refusal.code(), detail: refusal.detail() }
@@ -33,7 +33,7 @@ impl Status {
         u32::from(self.busy) | u32::from(self.code & 0x7F) << 1 | u32::from(self.detail) << 16
     }
 
-    /// The status in a word, read from a node. Bits 8 to 15 have no meaning.
+    /// The status in a word that was read from a node. Bits 8 to 15 have no meaning.
     #[must_use]
     pub fn from_word(word: u32) -> Status {
         let [low, _, detail @ ..] = word.to_le_bytes();

@@ -1,4 +1,4 @@
-//! What this node is, and whether an image is for it.
+//! Identity of this node, and whether an image is for it.
 
 use crate::area::Layout;
 use crate::flash::Flash;
@@ -7,37 +7,37 @@ use crate::key::KEY_LEN;
 use crate::refusal::Refusal;
 use crate::security::Security;
 
-/// What an image must fit.
+/// Properties of the node that an image must fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// Where things are in flash.
+    /// The areas in flash.
     pub layout: Layout,
     /// The product (1018h:2).
     pub product: u32,
     /// The hardware revision, 0 to 31.
     pub hardware: u8,
-    /// The public keys that images are signed with, by their number; [`crate::key::PUBLIC_KEYS`] in the product.
+    /// The public keys of images, by their number; [`crate::key::PUBLIC_KEYS`] in the product.
     pub keys: &'static [[u8; KEY_LEN]],
 }
 
 impl Target {
-    /// The key of an image.
+    /// The public key that belongs to an image.
     pub(crate) fn key_of(&self, header: &Header) -> Option<&'static [u8; KEY_LEN]> {
         self.keys.get(usize::from(header.description().key))
     }
 
-    /// The counter and the revoked keys.
+    /// The record of the security counter and the revoked keys.
     pub(crate) fn security(&self) -> Security {
         Security(self.layout.security())
     }
 
-    /// Whether the image may run on this node as it is now, if its signature is good.
+    /// Whether the image may run on this node in its present state, if its signature is valid.
     pub(crate) fn admit<F: Flash>(&self, flash: &mut F, header: &Header) -> Result<(), Refusal> {
         self.fits(header)?;
         self.security().admit(flash, header.description())
     }
 
-    /// Whether the image is for this product and hardware, not longer than there is room, and its counter one that can be kept.
+    /// Whether the image is for this product and hardware, not too long, and has a counter that can be recorded.
     fn fits(&self, header: &Header) -> Result<(), Refusal> {
         let about = header.description();
         if about.product != self.product {
@@ -54,7 +54,7 @@ impl Target {
     }
 }
 
-/// Bytes of header and code.
+/// Length of header and code in bytes.
 pub(crate) fn image_len(header: &Header) -> u32 {
     header.length().saturating_add(HEADER)
 }

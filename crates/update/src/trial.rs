@@ -1,17 +1,20 @@
-//! The trial of a new image: the image that ran before it is kept until the new one is confirmed, and comes back when the new one
+//! The trial of a new image: the previous image is kept until the new one is confirmed, and is restored if the new one
 //! fails.
 //!
-//! The trial is open from the end of the copy (the commit record of staging says *done*) for as long as the record of the kept
-//! image says *pending*; to confirm is to program *done* there. In front of the commit record of staging are the marks of
-//! the trial, which an update erases with staging:
+//! The trial is open from the end of the copy (the commit record of staging is *done*) for as long as the record of the
+//! kept image is *pending*; confirming means to program *done* there. The marks of the trial are in front of the commit
+//! record of staging, and an update erases them together with staging:
 //!
-//! | mark | it is set |
+//! | mark | set |
 //! |---|---|
-//! | 0 to 2 | at each start that nobody asked for: after a crash, the watchdog, or power-on |
-//! | 3 | the trial is withdrawn: nobody has confirmed the image in time, or a master wants the one before. Also when the way back begins: marks that a cut left half programmed decide nothing any more |
+//! | 0 to 2 | at each unrequested start: after a crash, the watchdog, or power-on |
+//! | 3 | when the trial is withdrawn: no confirmation in time, or the command of a master |
 //!
-//! With mark 3, or with 0 to 2, the trial is lost. A mark is a word of zeros, as those of the record. The trial is that of one image: of
-//! an application that a debugger has put there since, nothing is said.
+//! Mark 3 is also set before the previous image is restored, so that marks which a cut left half programmed no longer
+//! matter.
+//!
+//! The trial is lost with mark 3, or with all of the marks 0 to 2. A mark is a word of zeros, like those of the record.
+//! The trial concerns one image only: an application that a debugger has written since is not on trial.
 
 use core::ops::Range;
 
@@ -22,44 +25,44 @@ use crate::header::HEADER;
 use crate::record::{Commit, RECORD_ROOM, Record, is_zero, mark};
 use crate::refusal::Refusal;
 
-/// Room of a mark: a word of whatever size.
+/// Room for a mark: a word of any size.
 const ROOM: u32 = 8;
-/// So many starts that nobody asked for lose the trial.
+/// Number of unrequested starts that lose the trial.
 const STRIKES: u32 = Crashes::LIMIT as u32;
-/// The mark that the trial is withdrawn.
+/// Number of the mark for a withdrawn trial.
 const WITHDRAWN: u32 = STRIKES;
 
-/// How the trial of the application stands.
+/// State of the application's trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trial {
-    /// There is none: the application was confirmed, or nothing could have come back.
+    /// No trial: the application was confirmed, or there is no image to restore.
     #[default]
     None,
-    /// The application is to be confirmed.
+    /// The application has to be confirmed.
     Open,
-    /// The image before is to come back.
+    /// The previous image has to be restored.
     Lost(Reason),
-    /// The image before is back.
+    /// The previous image has been restored.
     Over(Reason),
 }
 
 /// Why a trial was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// Three starts that nobody asked for, and no confirmation.
+    /// Three unrequested starts without a confirmation.
     Starts,
     /// No confirmation in time, or the command of a master.
     Withdrawn,
 }
 
 impl Trial {
-    /// Reads how the trial stands.
+    /// Reads the state of the trial.
     pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Trial {
         let (staged, kept) = (staged(layout).read(flash), kept(layout).read(flash));
         let image = if staged == Commit::None { layout.kept() } else { layout.staging() };
         let is_in_place = crc(flash, layout.application()) == crc(flash, image);
         match (staged, kept, reason(flash, layout)) {
-            // The application may be half copied then.
+            // In this state the application may be half copied.
             (Commit::Done, Commit::Pending, Some(reason)) => Trial::Lost(reason),
             (Commit::Done, Commit::Pending, None) if is_in_place => Trial::Open,
             (Commit::None, _, Some(reason)) if is_in_place => Trial::Over(reason),
@@ -67,13 +70,13 @@ impl Trial {
         }
     }
 
-    /// Where the marks and records are that a trial reads and programs, as offsets.
+    /// The ranges of the marks and records that a trial reads and programs, as offsets.
     #[must_use]
     pub fn records(layout: &Layout) -> [Range<u32>; 2] {
         [layout.staging().end(), layout.kept().end()].map(|end| end.saturating_sub(RECORD_ROOM)..end)
     }
 
-    /// The application is confirmed. To do so again does no harm.
+    /// Confirms the application. Repeated calls do no harm.
     ///
     /// # Errors
     /// [`Refusal::Write`], [`Refusal::Unspecified`].
@@ -81,7 +84,7 @@ impl Trial {
         kept(layout).done(flash)
     }
 
-    /// The image before is to come back at the next start.
+    /// Withdraws the trial: the previous image is restored at the next start.
     ///
     /// # Errors
     /// [`Refusal::Write`], [`Refusal::Unspecified`].
@@ -100,14 +103,14 @@ pub(crate) fn kept(layout: &Layout) -> Record {
     Record(layout.kept().end())
 }
 
-/// The CRC of the header in this area, by which an image is known. A flash that cannot be read has none.
+/// The CRC of the header in this area, which identifies an image. Zeros for a flash that cannot be read.
 fn crc<F: Flash>(flash: &mut F, area: Area) -> [u8; 4] {
     let mut crc = [0; 4];
     let _ = flash.read(area.start().saturating_add(HEADER - 4), &mut crc);
     crc
 }
 
-/// A start that nobody asked for.
+/// Counts an unrequested start.
 pub(crate) fn strike<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
     let next = strikes(flash, layout).min(STRIKES - 1);
     mark(flash, place(layout, next))
@@ -123,7 +126,7 @@ fn reason<F: Flash>(flash: &mut F, layout: &Layout) -> Option<Reason> {
     }
 }
 
-/// The marks from the first on that are set.
+/// Number of consecutive marks that are set, from the first on.
 fn strikes<F: Flash>(flash: &mut F, layout: &Layout) -> u32 {
     let is_open = |number: &u32| !is_set(flash, layout, *number);
     (0..STRIKES).find(is_open).unwrap_or(STRIKES)

@@ -1,52 +1,51 @@
-//! The update as a machine that is polled: each poll does one bounded step.
+//! The update as a state machine that is polled: each poll does one bounded step.
 
 use crate::area::{Area, Layout};
 use crate::copy::Copy;
+use crate::download::Download;
 use crate::erase::Erase;
 use crate::flash::Flash;
 use crate::header::Header;
 use crate::image::{self, FullCheck};
-use crate::receive::Receiver;
 use crate::record::{Commit, Record};
 use crate::refusal::Refusal;
 use crate::status::Status;
 use crate::target::Target;
 use crate::trial::{self, Trial};
 
-/// What the next [`Updater::poll`] will do, so that the caller knows when to call it.
+/// Kind of the next [`Updater::poll`], so that the caller knows when to call it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// Nothing: a command has to come.
+    /// Nothing, until the next command.
     Nothing,
-    /// The flash erases by itself, 0.5 to 2 s for a sector; poll again in a millisecond or so.
+    /// The flash erases in the background, 0.5 to 2 s for a sector; poll again after about a millisecond.
     Erasing,
-    /// A step of at most 64 words programmed, 1 KiB read, or a part of the check of the signature: 1 ms typical, 7 ms
-    /// most.
+    /// A step: at most 64 words programmed, 1 KiB read, or a part of the signature check. 1 ms typical, 7 ms at most.
     Step,
 }
 
-/// How far an update is.
+/// Progress of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Nothing was begun, or it was refused: [`Updater::status`] says why.
+    /// No update was begun, or it was refused: see [`Updater::status`].
     Idle,
     /// Staging is being erased.
     Clearing,
     /// Staging is erased; a download may begin.
     Cleared,
-    /// A download is under way.
+    /// A download is in progress.
     Receiving,
-    /// The staged image is being checked, or the one that is to be kept or to come back.
+    /// The staged image is being checked, or the image to be kept or restored.
     Checking,
-    /// It is good, and will be copied whatever happens.
+    /// The staged image is valid and will be copied, whatever happens.
     Committed,
-    /// The image is being copied, or the application before it to where it is kept.
+    /// The image is being copied, or the present application is being copied to the area of the kept image.
     Copying,
-    /// It was copied: ask [`crate::boot`].
+    /// The image was copied: call [`crate::boot`].
     Installed,
 }
 
-/// The machine. Nothing in it has to survive a reset: [`crate::boot`] finds in flash what is left to do.
+/// The state machine. None of its state has to survive a reset: [`crate::boot`] finds the remaining work in flash.
 pub struct Updater<F> {
     flash: F,
     target: Target,
@@ -59,30 +58,30 @@ enum State {
     Idle,
     Clearing(Erase),
     Cleared,
-    Receiving(Receiver),
+    Receiving(Download),
     Checking(FullCheck, Plan),
     Committed,
-    /// The new place of the image with this header is being erased.
+    /// The destination of the image with this header is being erased.
     Erasing(Erase, Header, Plan),
     Copying(Copy, Plan),
     Installed,
 }
 
-/// Why an image is checked, and then copied.
+/// Purpose of checking and copying an image.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Plan {
-    /// The staged image, to be committed.
+    /// Commit the staged image.
     Commit,
-    /// The staged image, to be the application.
+    /// Install the staged image as the application.
     Install,
-    /// The application, to be kept while the staged image is on trial. What follows is to install that.
+    /// Keep the application while the staged image is on trial; the staged image is installed afterwards.
     Keep,
-    /// The kept image, to be the application again.
+    /// Restore the kept image as the application.
     Revert,
 }
 
 impl Plan {
-    /// Where the image is, and where it will be.
+    /// Source and destination of the image.
     fn areas(self, layout: &Layout) -> (Area, Area) {
         match self {
             Plan::Keep => (layout.application(), layout.kept()),
@@ -93,7 +92,7 @@ impl Plan {
 }
 
 impl<F: Flash> Updater<F> {
-    /// A machine with nothing to do. `status` is what 1F57h reads until something was done: [`Status::GOOD`], or that of
+    /// An idle machine. `status` is the value of 1F57h until the first command: [`Status::GOOD`], or the status of
     /// [`crate::Stay`].
     pub fn new(flash: F, target: Target, status: Status) -> Updater<F> {
         Updater { flash, target, state: State::Idle, status }
@@ -104,7 +103,7 @@ impl<F: Flash> Updater<F> {
         &mut self.flash
     }
 
-    /// How far it is.
+    /// The present phase.
     pub fn phase(&self) -> Phase {
         match self.state {
             State::Idle => Phase::Idle,
@@ -118,12 +117,12 @@ impl<F: Flash> Updater<F> {
         }
     }
 
-    /// What 1F57h reads.
+    /// Value of 1F57h.
     pub fn status(&self) -> Status {
         if self.is_busy() { Status::BUSY } else { self.status }
     }
 
-    /// What the next poll will do.
+    /// Kind of the next poll.
     pub fn next(&self) -> Next {
         match &self.state {
             State::Clearing(erase) | State::Erasing(erase, ..) if erase.is_at_work() => Next::Erasing,
@@ -132,8 +131,8 @@ impl<F: Flash> Updater<F> {
         }
     }
 
-    /// Clears the program (1F51h = 3): begins to erase staging. A download under way, or an image that was not copied yet,
-    /// is lost; the application is not touched.
+    /// Clears the program (1F51h = 3): starts to erase staging. A download in progress, or an image that was not copied
+    /// yet, is lost; the application is unchanged.
     ///
     /// # Errors
     /// [`Refusal::Unspecified`] while the machine is busy; [`Refusal::Write`].
@@ -144,10 +143,11 @@ impl<F: Flash> Updater<F> {
         self.settle(outcome)
     }
 
-    /// A download to 1F50h begins. `size` in bytes, where the client has said it.
+    /// Begins a download to 1F50h. `size` in bytes, if the client has announced it.
     ///
     /// # Errors
-    /// [`Refusal::NotCleared`] without [`Updater::clear`] before, [`Refusal::TooLong`], [`Refusal::Unspecified`] while busy.
+    /// [`Refusal::NotCleared`] without an [`Updater::clear`] before, [`Refusal::TooLong`], [`Refusal::Unspecified`]
+    /// while busy.
     pub fn begin(&mut self, size: Option<u32>) -> Result<(), Refusal> {
         self.not_busy()?;
         if !matches!(self.state, State::Cleared) {
@@ -156,15 +156,15 @@ impl<F: Flash> Updater<F> {
         if size.is_some_and(|size| size > self.target.layout.longest_image()) {
             return self.refuse(Refusal::TooLong);
         }
-        self.state = State::Receiving(Receiver::new());
+        self.state = State::Receiving(Download::new());
         self.settle(Ok(()))
     }
 
-    /// The next bytes of the download, any number. They are programmed before this returns, in chunks of 64 words, so a
-    /// call takes 4 us a byte (25 us most). What is wrong with the header is said as soon as it is there.
+    /// Takes the next bytes of the download, any number. They are programmed before this function returns, in chunks of
+    /// 64 words, so a call takes 4 us a byte (25 us at most). An invalid header is refused as soon as it is complete.
     ///
     /// # Errors
-    /// Why the download is refused; it is over then. [`Refusal::Unspecified`] when there is none.
+    /// The reason for the refusal; the download is over then. [`Refusal::Unspecified`] without a download.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<(), Refusal> {
         let State::Receiving(receiver) = &mut self.state else {
             return Err(Refusal::Unspecified);
@@ -173,10 +173,10 @@ impl<F: Flash> Updater<F> {
         outcome.or_else(|refusal| self.settle(Err(refusal)))
     }
 
-    /// The download is complete: the image is checked, and committed if it is good.
+    /// Ends the download: the image is checked, and committed if it is valid.
     ///
     /// # Errors
-    /// As [`Updater::receive`].
+    /// Those of [`Updater::receive`].
     pub fn finish(&mut self) -> Result<(), Refusal> {
         let State::Receiving(receiver) = &mut self.state else {
             return Err(Refusal::Unspecified);
@@ -186,13 +186,13 @@ impl<F: Flash> Updater<F> {
         self.check(Plan::Commit, check)
     }
 
-    /// Copies the staged image to the application area, after another check of it. The application there is kept before, if it is
-    /// whole, and the new one is on trial then. For a committed image, of this start
-    /// or one before ([`crate::Decision::Copy`]); there nothing else may come first.
+    /// Copies the staged image to the application area, after checking it again. If the present application is
+    /// complete, it is kept first, and the new one is then on trial. For a committed image, of this start or of an
+    /// earlier one ([`crate::Decision::Copy`]), for which this must be the first command.
     ///
     /// # Errors
-    /// [`Refusal::Unspecified`] when nothing is committed, or while busy; why the staged image is refused. It is not tried
-    /// again then.
+    /// [`Refusal::Unspecified`] if nothing is committed, or while busy; the reason why the staged image is refused. It
+    /// is not tried again in that case.
     pub fn install(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
         if !matches!(self.staged().read(&mut self.flash), Commit::Pending | Commit::Done) {
@@ -202,25 +202,25 @@ impl<F: Flash> Updater<F> {
         self.check(Plan::Install, check)
     }
 
-    /// Copies the kept image back to the application area, after a check of it: the trial of the application is lost
-    /// ([`crate::Decision::Revert`]). If the kept image is not good, the trial ends without it.
+    /// Copies the kept image back to the application area, after checking it, because the application has lost its
+    /// trial ([`crate::Decision::Revert`]). If the kept image is not valid, the trial ends without it.
     ///
     /// # Errors
-    /// [`Refusal::Unspecified`] when no trial is lost, or while busy; why the kept image is refused.
+    /// [`Refusal::Unspecified`] if no trial is lost, or while busy; the reason why the kept image is refused.
     pub fn revert(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
         let layout = &self.target.layout;
         if !matches!(Trial::read(&mut self.flash, layout), Trial::Lost(_)) {
             return Err(Refusal::Unspecified);
         }
-        // The trial must be lost for good before the application is touched.
+        // The loss of the trial must be final before the application is touched.
         Trial::withdraw(&mut self.flash, layout)?;
         let kept = layout.kept();
         let header = image::admitted(&mut self.flash, &self.target, kept);
         self.check(Plan::Revert, header.map(|header| FullCheck::of(header, kept)))
     }
 
-    /// Begins a check.
+    /// Starts a check.
     fn check(&mut self, plan: Plan, check: Result<FullCheck, Refusal>) -> Result<(), Refusal> {
         let outcome = match check {
             Ok(check) => {
@@ -232,15 +232,15 @@ impl<F: Flash> Updater<F> {
         self.settle(outcome)
     }
 
-    /// One step of what was begun, if anything was. Returns what the next one will do.
+    /// Does one step of the operation in progress, if any. Returns the kind of the next poll.
     pub fn poll(&mut self) -> Next {
         let keeps = matches!(self.state, State::Erasing(.., Plan::Keep) | State::Copying(_, Plan::Keep));
         if let Err(refusal) = self.step() {
             if keeps {
-                // The application is whole, and stays: the next start must not try the staged image again.
+                // The application is still complete and stays: the next start must not try the staged image again.
                 let _ = self.staged().revoke(&mut self.flash);
             }
-            // Whoever wants to know reads the status.
+            // The caller can read the result in the status.
             let _ = self.settle(Err(refusal));
         }
         self.next()
@@ -262,13 +262,13 @@ impl<F: Flash> Updater<F> {
         if self.is_busy() { Err(Refusal::Unspecified) } else { Ok(()) }
     }
 
-    /// A command is refused and changes nothing.
+    /// Refuses a command, which changes nothing.
     fn refuse(&mut self, refusal: Refusal) -> Result<(), Refusal> {
         self.status = Status::refused(refusal);
         Err(refusal)
     }
 
-    /// What was begun goes on, or is over.
+    /// Continues after success, or ends the operation after an error.
     fn settle(&mut self, outcome: Result<(), Refusal>) -> Result<(), Refusal> {
         if let Err(refusal) = outcome {
             self.state = State::Idle;
@@ -278,7 +278,7 @@ impl<F: Flash> Updater<F> {
         Ok(())
     }
 
-    /// One step, and what follows when what was begun has come to its end.
+    /// Does one step, and starts the next operation when one has ended.
     fn step(&mut self) -> Result<(), Refusal> {
         let (flash, target) = (&mut self.flash, &self.target);
         match &mut self.state {
@@ -313,7 +313,7 @@ impl<F: Flash> Updater<F> {
         }
     }
 
-    /// The image is good.
+    /// Continues after a successful check of the image.
     fn accept(&mut self, plan: Plan, header: Header) -> Result<(), Refusal> {
         match plan {
             Plan::Commit => {
@@ -322,7 +322,7 @@ impl<F: Flash> Updater<F> {
                 return Ok(());
             }
             Plan::Install => {
-                // The commit must hold for good before the application is touched.
+                // The commit must be final before the application is touched.
                 self.staged().close(&mut self.flash)?;
                 return self.keep(header);
             }
@@ -333,8 +333,8 @@ impl<F: Flash> Updater<F> {
         Ok(())
     }
 
-    /// Keeps the application, unless an image is kept already: the one that ran before an application that nobody has confirmed, or
-    /// this application, if the copy was cut.
+    /// Keeps the application, unless an image is kept already: the image that ran before an unconfirmed application, or
+    /// this application if the copy was cut.
     fn keep(&mut self, staged: Header) -> Result<(), Refusal> {
         let application = self.target.layout.application();
         if self.kept().read(&mut self.flash) == Commit::Pending {
@@ -347,13 +347,13 @@ impl<F: Flash> Updater<F> {
         Ok(())
     }
 
-    /// Begins to erase the new place of an image.
+    /// Starts to erase the destination of an image.
     fn replace(&mut self, plan: Plan, header: Header) {
         let (_, to) = plan.areas(&self.target.layout);
         self.state = State::Erasing(Erase::new(to), header, plan);
     }
 
-    /// The copy is whole.
+    /// Continues after a complete copy.
     fn copied(&mut self, plan: Plan) -> Result<(), Refusal> {
         match plan {
             Plan::Keep => {
@@ -361,7 +361,8 @@ impl<F: Flash> Updater<F> {
                 return self.install_staged();
             }
             Plan::Revert => {
-                // Without the record of staging there is no trial. What is left open of the kept image does no harm.
+                // Without the record of staging there is no trial. A record of the kept image that stays open does no
+                // harm.
                 self.staged().revoke(&mut self.flash)?;
                 self.kept().done(&mut self.flash)?;
             }
@@ -371,19 +372,19 @@ impl<F: Flash> Updater<F> {
         Ok(())
     }
 
-    /// The staged image, which was found good before the application was kept.
+    /// Installs the staged image, which was found valid before the application was kept.
     fn install_staged(&mut self) -> Result<(), Refusal> {
         let header = image::candidate(&mut self.flash, &self.target)?;
         self.replace(Plan::Install, header);
         Ok(())
     }
 
-    /// The image is not good. What was committed must not be tried again at the next start.
+    /// Handles an invalid image. A committed image must not be tried again at the next start.
     fn give_up(&mut self, plan: Plan, refusal: Refusal) -> Result<(), Refusal> {
         match plan {
             Plan::Commit => {}
             Plan::Install => self.staged().revoke(&mut self.flash)?,
-            // There is nothing that could be kept.
+            // The application is not valid, so it cannot be kept.
             Plan::Keep => return self.install_staged(),
             Plan::Revert => self.kept().done(&mut self.flash)?,
         }

@@ -1,24 +1,24 @@
-//! The backup SRAM, which keeps its content through a loss of power as long as there is a battery behind VBAT.
+//! The backup SRAM, which keeps its content while the main supply is off, as long as there is a battery at VBAT.
 
 use stm32f4xx_hal::pac::{CRC, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use crate::kept::{Checksum, Content, Found, Keeper, Slots};
+use crate::backup_copies::{BackupCopies, BackupState, Checksum, Content, Slots};
 use crate::losses::{Event, Losses};
 
-/// 4 KiB (RM0390, table 1; RM0090, table 1).
+/// Start of the 4 KiB (RM0390, table 1; RM0090, table 1).
 const BASE: *const Slots = 0x4002_4000 as *const Slots;
 
 const _: () = assert!(size_of::<Slots>() <= 4096);
 
-/// The memory, with two copies of its content: see [`Keeper`].
+/// The memory with two copies of its content: see [`BackupCopies`].
 pub struct BackupMemory {
     power: PWR,
-    keeper: Keeper<'static, CrcUnit>,
+    copies: BackupCopies<'static, CrcUnit>,
     losses: &'static Losses,
 }
 
-/// CRC-32/MPEG-2, by the unit of the chip (RM0390, 4).
+/// CRC-32/MPEG-2 by the CRC unit of the chip (RM0390, 4).
 struct CrcUnit(CRC);
 
 impl CrcUnit {
@@ -45,31 +45,31 @@ impl Checksum for CrcUnit {
 }
 
 impl BackupMemory {
-    /// Switches the memory on and finds the newer copy. The backup regulator need not be ready yet: the memory runs from the main
-    /// supply until that fails (RM0390, 5.1.2).
+    /// Switches the memory on and finds the newer copy. The backup regulator need not be ready yet, because the memory
+    /// runs from the main supply until that fails (RM0390, 5.1.2).
     pub(crate) fn open(
         power: PWR,
         crc: CRC,
         losses: &'static Losses,
         rcc: &mut Rcc,
-    ) -> (BackupMemory, Found) {
+    ) -> (BackupMemory, BackupState) {
         PWR::enable(rcc);
         rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
         protect(&power, false);
         power.csr().modify(|_, w| w.bre().set_bit());
         protect(&power, true);
-        // SAFETY: the memory is there, on and aligned, and any bits of it are numbers. `power` is given to this function
-        // only, once, so nothing else refers to it.
+        // SAFETY: the memory exists, is on and aligned, and any bits in it are valid numbers. `power` is given to this
+        // function only, and once, so nothing else refers to the memory.
         let slots = unsafe { &*BASE };
-        let (keeper, found) = Keeper::open(slots, CrcUnit::new(crc, rcc));
-        (BackupMemory { power, keeper, losses }, found)
+        let (copies, found) = BackupCopies::open(slots, CrcUnit::new(crc, rcc));
+        (BackupMemory { power, copies, losses }, found)
     }
 
-    /// Writes the older copy. The memory is write protected but for the time of this call. A write that does not arrive is counted
-    /// ([`Event::BackupWrite`]); the newer copy stays good, and the next write goes to the same place.
+    /// Writes the older copy. The memory is write protected except during this call. A write that fails is counted
+    /// ([`Event::BackupWrite`]); the newer copy stays valid, and the next write goes to the same place.
     pub fn write(&mut self, content: &Content) {
         protect(&self.power, false);
-        let is_kept = self.keeper.write(content);
+        let is_kept = self.copies.write(content);
         protect(&self.power, true);
         if !is_kept {
             self.losses.count(Event::BackupWrite);
@@ -77,7 +77,8 @@ impl BackupMemory {
     }
 }
 
-/// DBP. The bus of PWR is slower than the bus of the memory: reading the register back waits until the write has arrived.
+/// Sets DBP. The bus of PWR is slower than the bus of the memory, so the register is read back to wait until the write
+/// has arrived.
 fn protect(power: &PWR, on: bool) {
     power.cr().modify(|_, w| w.dbp().bit(!on));
     let _ = power.cr().read();

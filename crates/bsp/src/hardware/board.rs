@@ -1,4 +1,4 @@
-//! Bring-up of the whole board in one place: clocks, pins, and who owns which peripheral.
+//! Bring-up of the whole board in one place: clocks, pins, and the owner of each peripheral.
 
 use stm32f4xx_hal::dma::StreamsTuple;
 use stm32f4xx_hal::pac::{DBGMCU, Peripherals, RCC};
@@ -19,23 +19,23 @@ use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
 use super::watchdog::StartUpWatchdog;
+use crate::backup_copies::BackupState;
 use crate::bit_timing::APB1_HZ;
-use crate::kept::Found;
 use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
-/// The board's name, object 1009h.
+/// Name of the board, object 1009h.
 #[cfg(feature = "stm32f446")]
 pub const NAME: &str = "NUCLEO-F446RE";
-/// The board's name, object 1009h.
+/// Name of the board, object 1009h.
 #[cfg(not(feature = "stm32f446"))]
 pub const NAME: &str = "STM32F405/407";
 
-/// Everything the application uses of the board.
+/// All parts of the board that the application uses.
 pub struct Board {
     /// Why the chip was reset.
     pub reset_cause: ResetCause,
-    /// Runs already, with the long time-out of the start-up.
+    /// Already running, with the long time-out of the start-up.
     pub watchdog: StartUpWatchdog,
     /// The interrupt of the time base.
     pub time: TimeInterrupt,
@@ -43,7 +43,7 @@ pub struct Board {
     pub alarms: [Alarm; 2],
     /// The CAN controller, not yet on the bus.
     pub can: Controller,
-    /// Its transmit mailboxes.
+    /// The transmit mailboxes.
     pub transmitter: Transmitter,
     /// The pages of the parameter store.
     pub parameters: ParameterFlash,
@@ -53,8 +53,8 @@ pub struct Board {
     pub ssi: Ssi,
     /// The backup SRAM.
     pub backup: BackupMemory,
-    /// What the backup SRAM held at the start.
-    pub found: Found,
+    /// Content of the backup SRAM at the start.
+    pub backup_state: BackupState,
     /// The digital inputs.
     pub buttons: Buttons,
     /// The digital outputs.
@@ -64,8 +64,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts everything but the bus and the sampling. The watchdog comes first: a crystal that does not start ends in a
-    /// reset too. Events that the hardware loses later on are counted in `losses`.
+    /// Starts everything but the bus and the sampling. The watchdog comes first, so that a crystal that does not start
+    /// also ends in a reset. Later losses of hardware events are counted in `losses`.
     #[must_use]
     pub fn start(device: Peripherals, losses: &'static Losses) -> Board {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
@@ -104,7 +104,7 @@ impl Board {
             data: gpiob.pb14,
         };
         let ssi = Ssi::new(absolute, losses, &mut rcc);
-        let (backup, found) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
+        let (backup, backup_state) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
         let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
         let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);
@@ -120,7 +120,7 @@ impl Board {
             front_end,
             ssi,
             backup,
-            found,
+            backup_state,
             buttons,
             lamps,
             led,
@@ -128,22 +128,22 @@ impl Board {
     }
 }
 
-/// Reads and clears the flags, so that the next reset tells its own cause only.
+/// Reads and clears the flags, so that the next reset shows only its own cause.
 fn reset_cause(rcc: &RCC) -> ResetCause {
     let cause = ResetCause::from_csr(rcc.csr().read().bits());
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     cause
 }
 
-/// Keeps the debug port clocked while the core sleeps: RTT is read then.
+/// Keeps the debug port clocked while the core sleeps, because RTT is read then.
 pub(super) fn keep_debugger(debug: &DBGMCU) {
     debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 }
 
-/// 144 MHz from HSE, APB1 at 36 MHz for the sake of the bit rates, APB2 at 72 MHz.
+/// 144 MHz from HSE. APB1 has 36 MHz because the bit rates need it, APB2 72 MHz.
 fn clocks(rcc: RCC) -> Rcc {
     let config = Config::hse(8.MHz()).sysclk(144.MHz()).pclk1(36.MHz()).pclk2(72.MHz());
-    // The NUCLEO gets its 8 MHz from the ST-LINK, boards with the other chips have a crystal.
+    // The NUCLEO gets its 8 MHz from the ST-LINK; boards with the other chips have a crystal.
     let config = if cfg!(feature = "stm32f446") { config.bypass_hse_oscillator() } else { config };
     let rcc = rcc.freeze(config);
     assert_eq!(rcc.clocks.pclk1().raw(), APB1_HZ);

@@ -13,11 +13,12 @@ use crate::bit_timing::BitTiming;
 use crate::bus_state::BusState;
 use crate::filters::{self, BANKS, Bank, Fifo, Pair};
 
-/// The registers as bxcan wants them.
+/// The registers for the crate bxcan.
 pub(crate) struct Registers;
 
-// SAFETY: CAN1 is owned by `Controller`. The parts that share its registers use disjoint ones: the controller those of
-// mode, timing, errors and filters, the transmitter those of the transmit mailboxes, each receiver those of its FIFO.
+// SAFETY: CAN1 is owned by `Controller`. The parts that share its registers use disjoint ones: the controller uses
+// those of mode, timing, errors and filters, the transmitter those of the transmit mailboxes, each receiver those of
+// its FIFO.
 unsafe impl bxcan::Instance for Registers {
     const REGISTERS: *mut bxcan::RegisterBlock = CAN1::ptr().cast_mut().cast();
 }
@@ -31,13 +32,13 @@ unsafe impl bxcan::FilterOwner for Registers {
 unsafe impl bxcan::MasterInstance for Registers {}
 
 pub(crate) fn registers() -> &'static can1::RegisterBlock {
-    // SAFETY: see the implementation of `Instance`; whoever calls this keeps to its own registers.
+    // SAFETY: see the implementation of `Instance`; each caller uses its own registers only.
     unsafe { &*CAN1::ptr() }
 }
 
-/// Takes the controller off the bus at once, in the middle of a frame too, until the next reset of the chip.
+/// Takes the controller off the bus at once, even in the middle of a frame, until the next reset of the chip.
 pub(super) fn hold_in_reset() {
-    // SAFETY: the program has ended: nobody else writes the register any more.
+    // SAFETY: the program has ended, so nobody else writes the register.
     unsafe { (*RCC::ptr()).apb1rstr().modify(|_, reset| reset.can1rst().set_bit()) };
 }
 
@@ -48,20 +49,21 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Takes the peripheral and its pins, and leaves the bus alone until [`Controller::start`].
+    /// Takes the peripheral and its pins, without going on the bus until [`Controller::start`].
     pub(crate) fn new(can: CAN1, tx: PB9, rx: PB8, rcc: &mut Rcc) -> (Controller, Transmitter) {
         let pins = Pins::new(can, (tx, rx), rcc);
         let can = bxcan::Can::builder(Registers).leave_disabled();
         (Controller { can, _pins: pins }, Transmitter::new())
     }
 
-    /// Goes on the bus, again when it was there: drops what is in the mailboxes and takes new timing and filters. Error
-    /// counters start from zero. It does not wait for the bus: one that is stuck must not keep the node from starting.
+    /// Goes on the bus, or restarts on the bus: drops the content of the mailboxes and takes new timing and filters.
+    /// Error counters start from zero. The function does not wait for the bus, because a stuck bus must not keep the
+    /// node from starting.
     pub fn start(&mut self, timing: BitTiming, banks: &[Bank]) {
         self.join(timing, banks, false);
     }
 
-    /// Goes on the bus without a word: no frame, no acknowledge, no error frame. All frames come to FIFO 1.
+    /// Joins the bus silently: no frame, no acknowledge, no error frame. All frames come to FIFO 1.
     pub fn listen(&mut self, timing: BitTiming) {
         self.join(timing, &filters::everything(), true);
     }
@@ -74,23 +76,23 @@ impl Controller {
         self.mark_error_code();
         // Clears the sleep request; the controller joins after 11 recessive bits.
         let _ = self.can.enable_non_blocking();
-        // bxcan has asked for the return from bus-off as soon as the standard allows; `crate::back_off` knows better.
+        // bxcan has enabled the automatic return from bus-off; `crate::back_off` decides on the return instead.
         registers().mcr().modify(|_, w| w.abom().clear_bit());
     }
 
-    /// Returns from bus-off: after 128 times 11 recessive bits the controller takes part again (RM0390, 30.7.6). Does
-    /// nothing in any other state. Whoever finds it still off some time later calls it again.
+    /// Returns from bus-off: after 128 times 11 recessive bits the controller takes part again (RM0390, 30.7.6). No
+    /// effect in any other state. To be called again if the controller is still off some time later.
     pub fn recover(&mut self) {
         if self.state() == BusState::Off {
             registers().mcr().modify(|_, w| w.inrq().set_bit());
-            // Off the bus no frame has to end first: it is a matter of a few clocks.
+            // Off the bus, no frame has to end first, so this takes a few clocks only.
             let _ = (0..ACKNOWLEDGE_POLLS).find(|_| registers().msr().read().inak().bit_is_set());
             registers().mcr().modify(|_, w| w.inrq().clear_bit());
         }
     }
 
-    /// What has been heard since the last call, but for frames that wait in a FIFO; acknowledges the error interrupt, which would
-    /// come again and again otherwise.
+    /// Events since the last call, apart from frames that wait in a FIFO. Also acknowledges the error interrupt, which
+    /// would otherwise be raised again at once.
     pub fn heard(&mut self) -> Heard {
         acknowledge_error();
         let code = registers().esr().read().lec().bits();
@@ -103,18 +105,18 @@ impl Controller {
         }
     }
 
-    /// From now on, until the next start, every error raises the error interrupt.
+    /// Makes every error raise the error interrupt, until the next start.
     pub fn watch_errors(&mut self) {
         registers().ier().modify(|_, w| w.lecie().set_bit());
     }
 
-    /// The hardware never sets the code to this value, so any other one is new (RM0390, 30.9.2, LEC).
+    /// Sets LEC to a value that the hardware never sets, so that any other value is new (RM0390, 30.9.2, LEC).
     fn mark_error_code(&mut self) {
         // SAFETY: LEC takes any value.
         registers().esr().modify(|_, w| unsafe { w.lec().bits(UNTOUCHED) });
     }
 
-    /// Replaces the filters. Frames that end meanwhile, a few microseconds, are not received.
+    /// Replaces the filters. Frames that end during the change, a few microseconds, are not received.
     pub fn set_filters(&mut self, banks: &[Bank]) {
         let mut filters = self.can.modify_filters();
         filters.set_split(BANKS as u8).clear();
@@ -136,22 +138,22 @@ impl Controller {
                 | Interrupts::FIFO1_MESSAGE_PENDING
                 | Interrupts::ERROR,
         );
-        // What counts as an error for that last one, which bxcan does not know.
+        // The events that count as errors for the last of these interrupts; bxcan cannot set them.
         registers()
             .ier()
             .modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit().lecie().clear_bit());
     }
 }
 
-/// Acknowledges the error interrupt, which comes again and again until then. What has happened can still be read.
+/// Acknowledges the error interrupt, which is raised again until then. The error code can still be read afterwards.
 pub fn acknowledge_error() {
     registers().msr().write(|w| w.erri().set_bit());
 }
 
-/// How often to look for an acknowledge that comes at once, if at all.
+/// Number of polls for an acknowledge, which comes at once if at all.
 const ACKNOWLEDGE_POLLS: u32 = 1_000;
 
-/// Values of LEC (RM0390, 30.9.2): a frame without an error; one that nobody acknowledged; set by software.
+/// Values of LEC (RM0390, 30.9.2): a frame without an error; a frame without an acknowledge; set by software.
 const NO_ERROR: u8 = 0;
 const NO_ACKNOWLEDGE: u8 = 3;
 const UNTOUCHED: u8 = 7;

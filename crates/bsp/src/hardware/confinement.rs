@@ -1,32 +1,34 @@
-//! The memory protection unit (PM0214, 4.2) while the bootloader runs: nothing but the bootloader's own code is executed. What was
-//! received, and an application that nobody has looked at yet, are data, also for a processor that has lost its way.
+//! Memory protection unit (PM0214, 4.2) while the bootloader runs: only the bootloader's own code can be executed.
+//! Received data, and an application that is not verified yet, cannot be executed, even if the processor takes a wrong
+//! branch.
 
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::MPU;
 
-/// RBAR: the number of the region stands in the lowest bits.
+/// RBAR: the region number is in the lowest bits.
 const VALID: u32 = 1 << 4;
-/// RASR: normal memory that everybody may read and write, cached as the default map has it; the region counts.
+/// RASR: normal memory with full read and write access, cached as in the default map; region enabled.
 const NORMAL: u32 = 0b011 << 24 | 1 << 17 | 1;
-/// RASR: no code.
+/// RASR: no execution.
 const XN: u32 = 1 << 28;
-/// CTRL: the unit works, and the default map holds beside the regions: peripherals never have code.
+/// CTRL: the unit is on, and the default map applies outside of the regions, where peripherals are never executable.
 const ENABLE: u32 = 0b101;
 
-/// Base and number, then attributes. The later region goes before.
+/// Base and number, then attributes. The later region takes precedence.
 const REGIONS: [[u32; 2]; 2] = [
-    // Flash and RAM, all of the first gigabyte.
+    // Flash and RAM: the whole first gigabyte.
     [VALID, XN | NORMAL | 29 << 1],
-    // Where the code of the bootloader is (bootloader.x asserts it): 32 KiB behind the stack, the parts 3 to 6 of eight in 64 KiB.
+    // The code of the bootloader (asserted in bootloader.x): 32 KiB behind the stack, the parts 3 to 6 of eight in 64
+    // KiB.
     [0x2000_0000 | VALID | 1, NORMAL | 0b1000_0111 << 8 | 15 << 1],
 ];
 
-/// From now on only the bootloader runs. To be called from the code that runs in RAM.
+/// Makes only the bootloader's code executable. To be called from code in RAM.
 pub(super) fn begin() {
-    // SAFETY: no one else has the unit, and what goes on lies in the second region.
+    // SAFETY: nobody else uses the unit, and the running code lies in the second region.
     let mpu = unsafe { &*MPU::PTR };
     let [[first, of_first], [second, of_second]] = REGIONS;
-    // SAFETY: the unit is off: nothing follows from a region yet.
+    // SAFETY: the unit is off, so the regions have no effect yet.
     unsafe {
         mpu.rbar.write(first);
         mpu.rasr.write(of_first);
@@ -36,14 +38,14 @@ pub(super) fn begin() {
     switch(ENABLE);
 }
 
-/// From now on everything runs.
+/// Makes all memory executable again.
 pub(super) fn end() {
     switch(0);
 }
 
 #[inline(never)]
 fn switch(control: u32) {
-    // SAFETY: data goes everywhere with and without the unit.
+    // SAFETY: data accesses work with and without the unit.
     unsafe { (*MPU::PTR).ctrl.write(control) };
     dsb();
     isb();

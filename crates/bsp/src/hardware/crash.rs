@@ -1,18 +1,18 @@
-//! Writing the crash record at a crash, and reading it at the next start.
+//! Writes the crash record at a crash, and reads it at the next start.
 
 use core::panic::Location;
 
 use super::{memory, retained};
 use crate::crash_record::{Crash, Fault, Place, WORDS};
 
-/// Takes the crash that ended the last run; a second call finds none.
+/// Takes the crash that ended the last run; a second call returns none.
 pub fn take() -> Option<Crash> {
     let crash = Crash::open(&retained::crash());
     retained::set_crash([0; WORDS]);
     crash
 }
 
-/// Whether the last run ended in a crash that nobody has taken yet.
+/// Whether the last run ended in a crash that has not been taken yet.
 pub(super) fn is_recorded() -> bool {
     Crash::open(&retained::crash()).is_some()
 }
@@ -26,7 +26,7 @@ pub(crate) fn restart(crash: &Crash) -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// Says in the log what happened.
+/// Writes the crash to the log.
 pub fn log(crash: &Crash) {
     match crash {
         Crash::Fault(fault) => log_fault(fault),
@@ -54,8 +54,8 @@ fn log_fault(fault: &Fault) {
     defmt::error!("CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x}", cfsr, hfsr, address);
 }
 
-/// For the panic handler of an image. This crate has no handler of its own: a handler that uses the place of a panic is linked with
-/// the names of all source files, for which the bootloader has no room.
+/// For the panic handler of an image. This crate has no handler of its own, because a handler that uses the location of
+/// a panic is linked with the names of all source files, for which the bootloader has no room.
 pub fn panicked(place: Option<&Location<'_>>) -> ! {
     let place = place.map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
     restart(&Crash::Panic(place))

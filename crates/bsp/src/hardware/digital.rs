@@ -11,31 +11,31 @@ pub struct Buttons {
 }
 
 impl Buttons {
-    /// PC13 is the blue button of the NUCLEO, which has a pull-up resistor of its own.
+    /// The buttons. PC13 is the blue button of the NUCLEO, which has its own pull-up resistor.
     pub(crate) fn new(first: PC13, second: PC10) -> Buttons {
         let pins = (first.into_floating_input(), second.into_pull_up_input());
         Buttons { pins, debounced: [Debounce::new(); 2] }
     }
 
-    /// Which of them are pressed. To be called once a millisecond: contacts bounce.
+    /// Which buttons are pressed. To be called once a millisecond, because contacts bounce.
     pub fn sample(&mut self) -> [bool; 2] {
         let [first, second] = &mut self.debounced;
         [first.sample(self.pins.0.is_low()), second.sample(self.pins.1.is_low())]
     }
 }
 
-/// Two lamps, or what switches them: a high level is on.
+/// Two lamps or their drivers: a high level is on.
 pub struct Lamps {
     pins: (PC0<Output>, PC1<Output>),
 }
 
 impl Lamps {
-    /// Both are off.
+    /// The lamps, both off.
     pub(crate) fn new(first: PC0, second: PC1) -> Lamps {
         Lamps { pins: (first.into_push_pull_output(), second.into_push_pull_output()) }
     }
 
-    /// Switches them.
+    /// Switches the lamps.
     pub fn set(&mut self, [first, second]: [bool; 2]) {
         self.pins.0.set_state(first.into());
         self.pins.1.set_state(second.into());

@@ -1,16 +1,16 @@
 //! The incremental encoder: TIM4 counts every edge of A and B, and DMA1 copies the count at two events of TIM3.
 //!
-//! | event of TIM3 | stream | what the copy is |
+//! | event of TIM3 | stream | copied count |
 //! |---|---|---|
-//! | update, which starts a scan of the ADC | 2 | the count at the start of each scan, in step with the buffer of the ADC |
-//! | capture on channel 2, the index at PB5 | 5 | the count at the last index |
+//! | update, which starts a scan of the ADC | 2 | at the start of each scan, in step with the buffer of the ADC |
+//! | capture on channel 2, the index at PB5 | 5 | at the last index |
 //!
-//! So hardware alone decides at which instant the count is taken, as it does for the ADC, and no interrupt is spent on it.
+//! Hardware alone decides at which instant the count is taken, as for the ADC, and no interrupt is needed.
 //!
-//! A copy is late by what DMA1 needs: some ten cycles, and some more when it has to wait for a byte of the SSI, which is
-//! less than half a microsecond. At 6000 rpm and 1024 lines a count lasts 2.4 us, so the count at the index is right or one
-//! too far. An interrupt would be late by the longest task above it, some 10 us: four counts. (PB5 has no channel of TIM4,
-//! whose free channels 3 and 4 are at the pins of CAN.)
+//! A copy is delayed by the DMA1 transfer: some ten cycles, and some more when it has to wait for a byte of the SSI, in
+//! total less than half a microsecond. At 6000 rpm and 1024 lines a count lasts 2.4 us, so the count at the index is
+//! right or one too far. An interrupt would be delayed by the longest task above it, some 10 us: four counts. (PB5 has
+//! no channel of TIM4, whose free channels 3 and 4 are at the pins of CAN.)
 
 use core::sync::atomic::{AtomicU16, Ordering};
 
@@ -26,26 +26,26 @@ use super::sampling::SCANS;
 use super::stream;
 use crate::losses::{Event, Losses};
 
-/// ICxF of all three inputs: eight equal samples at a quarter of 72 MHz, so pulses of less than 444 ns are noise (RM0390,
-/// 17.4.7). That leaves 10,000 lines at 6000 rpm. Index and phases are late by the same time.
+/// ICxF of all three inputs: eight equal samples at a quarter of 72 MHz, so pulses of less than 444 ns are suppressed
+/// as noise (RM0390, 17.4.7). This allows 10,000 lines at 6000 rpm. Index and phases have the same delay.
 const FILTER: u8 = 0b0111;
 
-/// What DMA1 writes and the core reads. Atomic, because two bus masters share it.
+/// Written by DMA1 and read by the core. Atomic, because two bus masters share the memory.
 static COUNTS: [AtomicU16; 2 * SCANS] = [const { AtomicU16::new(0) }; 2 * SCANS];
 static AT_INDEX: AtomicU16 = AtomicU16::new(0);
 
-/// The encoder in one millisecond.
+/// Readings of the encoder in one millisecond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counted {
     /// Quarter periods, modulo 2^16, at the start of the last scan: 61 us before the interrupt.
     pub counter: u16,
-    /// The same at the last index; `None` when none came since the last call.
+    /// The count at the last index; `None` if there was none since the last call.
     pub index: Option<u16>,
-    /// Time has passed since the reading before that nobody has seen, or an index may have.
+    /// Time has passed unobserved since the reading before, or an index may have been missed.
     pub has_gap: bool,
 }
 
-/// The input.
+/// The encoder input.
 pub(super) struct Encoder {
     timer: TIM4,
     at_scan: Stream2<DMA1>,
@@ -54,7 +54,7 @@ pub(super) struct Encoder {
     _pins: (PB5<Alternate<2>>, PB6<Alternate<2>>, PB7<Alternate<2>>),
 }
 
-/// The peripherals and pins of the input.
+/// The peripherals and pins of the encoder input.
 pub(crate) struct Parts {
     pub(crate) timer: TIM4,
     pub(crate) at_scan: Stream2<DMA1>,
@@ -65,9 +65,11 @@ pub(crate) struct Parts {
 }
 
 impl Encoder {
-    /// Configures everything, while TIM3 (`scans`) is ready and does not run yet: the first count is that of the first scan.
+    /// Configures everything while TIM3 (`scans`) is ready but not running yet, so the first count belongs to the first
+    /// scan.
     ///
-    /// The pins have no pull-up resistors: they would not stand 5 V (STM32F446 datasheet, general operating conditions).
+    /// The pins have no pull-up resistors, because with them they would not tolerate 5 V (STM32F446 datasheet, general
+    /// operating conditions).
     pub(super) fn new(parts: Parts, scans: &TIM3, losses: &'static Losses, rcc: &mut Rcc) -> Encoder {
         let Parts { timer, mut at_scan, mut at_index, index, a, b } = parts;
         prepare_counter(&timer, rcc);
@@ -78,35 +80,36 @@ impl Encoder {
         Encoder { timer, at_scan, at_index, losses, _pins: pins }
     }
 
-    /// The copy that was made at the start of the last scan in this half of the buffers.
+    /// The count copied at the start of the last scan in this half of the buffers.
     pub(super) fn at_last_scan(&self, half: usize) -> u16 {
         let count = COUNTS.as_chunks::<SCANS>().0.get(half).and_then(|half| half.last());
         count.map_or(0, |count| count.load(Ordering::Relaxed))
     }
 
-    /// The count at this moment.
+    /// The present count.
     pub(super) fn now(&self) -> u16 {
         self.timer.cnt().read().bits() as u16
     }
 
-    /// Copies that are still to come in this round.
+    /// Number of copies still to come in this round.
     pub(super) fn copies_left(&self) -> usize {
         self.at_scan.number_of_transfers().into()
     }
 
-    /// No more copies at the starts of scans; a request that waits is dropped with its permission. The counting goes on.
+    /// Stops the copies at the starts of scans; a pending request is dropped. Counting continues.
     pub(super) fn stop_copies(&mut self, scans: &TIM3) {
         scans.dier().modify(|_, w| w.ude().clear_bit());
         stream::stop(&mut self.at_scan);
     }
 
-    /// The copies begin again with the first place of the buffer. TIM3 must stand still.
+    /// Restarts the copies with the first place of the buffer. TIM3 must be stopped.
     pub(super) fn start_copies(&mut self, scans: &TIM3) {
         copy(&mut self.at_scan, &self.timer, &COUNTS);
         scans.dier().modify(|_, w| w.ude().set_bit());
     }
 
-    /// The count at the last index; `None` when none came since the last call. And whether one may have been lost.
+    /// The count at the last index; `None` if there was none since the last call. Also returns whether an index may
+    /// have been lost.
     pub(super) fn index(&mut self) -> (Option<u16>, bool) {
         if !self.at_index.is_enabled() {
             self.losses.count(Event::Index);
@@ -117,7 +120,7 @@ impl Encoder {
         if !self.at_index.is_transfer_complete() {
             return (None, false);
         }
-        // In this order, one that comes in between is seen now and once more: that does no harm.
+        // In this order, an index that comes in between is reported twice, which does no harm.
         self.at_index.clear_flags(DmaFlag::TransferComplete);
         (Some(AT_INDEX.load(Ordering::Relaxed)), false)
     }
@@ -133,19 +136,20 @@ fn prepare_counter(timer: &TIM4, rcc: &mut Rcc) {
     timer.cr1().write(|w| w.cen().set_bit());
 }
 
-/// TIM3 asks for DMA at each update and at each rising edge on channel 2.
+/// Makes TIM3 request DMA at each update and at each rising edge on channel 2.
 fn prepare_events(scans: &TIM3) {
     scans.ccmr1_input().write(|w| w.cc2s().ti2().ic2f().set(FILTER));
     scans.ccer().write(|w| w.cc2e().set_bit());
     scans.dier().write(|w| w.ude().set_bit().cc2de().set_bit());
 }
 
-/// The stream that copies the count at each index.
+/// Sets up the stream that copies the count at each index.
 fn copy_at_index(stream: &mut Stream5<DMA1>, timer: &TIM4) {
     copy(stream, timer, core::slice::from_ref(&AT_INDEX));
 }
 
-/// A stream that copies the count to `target`, round and round. Both requests of TIM3 are on channel 5 (RM0390, table 28).
+/// Sets up a stream that copies the count to `target`, in circular mode. Both requests of TIM3 are on channel 5
+/// (RM0390, table 28).
 fn copy(stream: &mut impl Stream, timer: &TIM4, target: &'static [AtomicU16]) {
     stream.set_channel(DmaChannel::Channel5);
     stream.set_priority(Priority::VeryHigh);
@@ -155,8 +159,8 @@ fn copy(stream: &mut impl Stream, timer: &TIM4, target: &'static [AtomicU16]) {
     stream.set_number_of_transfers(target.len() as u16);
     stream.set_memory_increment(true);
     stream.set_circular_mode(true);
-    // SAFETY: half-words from a register that has 16 bits of content to half-words of `target`, which exists for ever and
-    // has as many of them as there are transfers in a round.
+    // SAFETY: half-words from a register with 16 bits of content to half-words of `target`, which is static and has one
+    // for each transfer in a round.
     unsafe {
         stream.set_peripheral_size(DmaDataSize::HalfWord);
         stream.set_memory_size(DmaDataSize::HalfWord);

@@ -1,4 +1,4 @@
-//! Values that the maker of the chip has programmed into the system memory: unique ID, sizes, calibration.
+//! Values that the chip's manufacturer has programmed into the system memory: unique ID, sizes, calibration.
 
 use stm32f4xx_hal::signature::{VrefCal, VtempCal30, VtempCal110};
 

@@ -1,7 +1,7 @@
-//! The handlers of what must never happen: every fault, a clock that fails, and interrupts without a handler.
+//! Handlers of events that must never happen: faults, a failure of the clock, and interrupts without a handler.
 //!
-//! The stack lies at the very start of RAM: a stack that overflows leaves RAM, which is a fault. The handler of that fault has no stack
-//! left to run on, so the handler switches to a small stack of its own before anything else.
+//! The stack lies at the very start of RAM, so a stack that overflows leaves RAM, which is a fault. The handler of that
+//! fault has no stack left, so it switches to a small emergency stack first.
 
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;
@@ -19,15 +19,15 @@ struct EmergencyStack(
     #[expect(dead_code, reason = "used by its address")] UnsafeCell<MaybeUninit<[u8; EMERGENCY_BYTES]>>,
 );
 
-// SAFETY: only the fault handler uses it, which nothing interrupts and which does not return.
+// SAFETY: only the fault handler uses the stack; nothing interrupts the handler, and it does not return.
 unsafe impl Sync for EmergencyStack {}
 
 #[unsafe(link_section = ".uninit.emergency_stack")]
 static EMERGENCY: EmergencyStack = EmergencyStack(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Every fault: none of the configurable ones is enabled, so all escalate to this (PM0214, 2.4.2).
+/// The handler of every fault: no configurable fault is enabled, so all escalate to HardFault (PM0214, 2.4.2).
 ///
-/// cortex-m-rt's own trampoline pushes to the stack that may just have overflowed, so this replaces it.
+/// Replaces the trampoline of cortex-m-rt, which pushes to the stack that may just have overflowed.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {
@@ -43,9 +43,9 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// `sp` is where the core pushed the registers of the program, if it could.
+/// `sp` is the address at which the core pushed the registers of the program, if it could.
 extern "C" fn record(sp: u32) -> ! {
-    // SAFETY: reads of system control registers, by the only code that still runs.
+    // SAFETY: reads of system control registers, by the only code that is still running.
     let scb = unsafe { &*SCB::PTR };
     let cfsr = scb.cfsr.read();
     let [lr, pc] = stacked(sp).unwrap_or_default();
@@ -56,7 +56,7 @@ extern "C" fn record(sp: u32) -> ! {
 /// CFSR: BFAR holds the address of a bus fault.
 const BFAR_VALID: u32 = 1 << 15;
 
-/// LR and PC of the eight words that the core pushes (PM0214, 2.3.7), when they lie in the stack.
+/// LR and PC of the eight words that the core pushes (PM0214, 2.3.7), if the words lie in the stack.
 fn stacked(sp: u32) -> Option<[u32; 2]> {
     let stack = memory::stack();
     let readable = sp.is_multiple_of(4) && sp >= stack.start && sp.checked_add(32)? <= stack.end;
@@ -64,17 +64,18 @@ fn stacked(sp: u32) -> Option<[u32; 2]> {
     readable.then(|| unsafe { ((sp + 20) as *const [u32; 2]).read_volatile() })
 }
 
-/// The clock on OSC_IN has failed: the core runs from HSI now, and the bit timing is wrong. The node comes back with the clock.
+/// The clock on OSC_IN has failed: the core runs from HSI, and the bit timing is wrong. The node restarts and waits for
+/// the clock.
 ///
-/// The controller leaves the bus before the crash record is written: the checksum of the record takes longer than a frame at
-/// this clock, and an error frame of wrong bits would destroy what others send meanwhile.
+/// The controller leaves the bus before the crash record is written. At the slow clock the checksum of the record takes
+/// longer than a frame, and in that time an error frame with wrong bit timing would destroy the frames of others.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() -> ! {
     can::hold_in_reset();
     crash::restart(&Crash::Clock)
 }
 
-/// An interrupt without a handler: the program enabled what it does not serve.
+/// An interrupt without a handler: the program has enabled an interrupt that it does not serve.
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     crash::restart(&Crash::Interrupt(number))

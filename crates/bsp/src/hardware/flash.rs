@@ -1,6 +1,7 @@
 //! The flash controller: words of 32 bits, sectors (RM0390, 3).
 //!
-//! The driver of stm32f4xx-hal programs byte by byte, erases several sectors for one and leaves error flags behind.
+//! The driver of stm32f4xx-hal is not used, because it programs byte by byte, erases several sectors instead of one,
+//! and leaves error flags behind.
 
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
 use stm32f4xx_hal::pac::FLASH;
@@ -11,8 +12,9 @@ use crate::flash_area::FlashArea;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// The error flags of SR; writing 1 clears one.
 const ERRORS: u32 = 0b1_1111_0010;
-/// How often to read BSY before an operation is given up: programming a word for about 10 ms (the data sheet allows 100 us), an erase
-/// for about 2.5 s (the data sheet allows 2 s). Reads are counted because the time base does not run whenever the bootloader programs.
+/// Number of reads of BSY before an operation is given up: about 10 ms for programming a word (the data sheet allows
+/// 100 us), about 2.5 s for an erase (the data sheet allows 2 s). Reads are counted because the time base is not always
+/// running when the bootloader programs.
 const PROGRAM_POLLS: u32 = 1 << 17;
 const ERASE_POLLS: u32 = 1 << 25;
 
@@ -22,7 +24,7 @@ pub struct Flash(FLASH);
 /// Why an operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// The place is outside of the area, or not on a boundary.
+    /// The place is outside of the area or not aligned.
     Place(NorFlashErrorKind),
     /// The error flags of the controller (RM0390, 3.8.4).
     Flags(u32),
@@ -52,21 +54,21 @@ impl Flash {
         Flash(flash)
     }
 
-    /// Copies bytes out of the flash: a few of them, as a word has.
+    /// Copies bytes from flash, fast for a few bytes such as a word.
     pub(super) fn read(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
-        // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
-        // value too.
+        // SAFETY: all bytes lie in flash, which is always readable, and nobody programs it during the call, because
+        // programming needs this value too.
         let there = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
         bytes.iter_mut().zip(there).for_each(|(to, from)| *to = *from);
         Ok(())
     }
 
-    /// The same, quicker for many bytes and slower for a few.
+    /// Copies bytes from flash, faster than `read` for many bytes and slower for a few.
     pub(super) fn read_many(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
-        // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
-        // value too. The bytes are in RAM.
+        // SAFETY: all bytes lie in flash, which is always readable, and nobody programs it during the call, because
+        // programming needs this value too. The destination is in RAM.
         unsafe { core::ptr::copy_nonoverlapping(address as *const u8, bytes.as_mut_ptr(), bytes.len()) };
         Ok(())
     }
@@ -81,7 +83,7 @@ impl Flash {
         Ok(())
     }
 
-    /// Programs one word and waits for it: 16 us, at most 100. Code that is fetched from flash stands still meanwhile.
+    /// Programs one word and waits for the end: 16 us, at most 100 us. Code in flash stands still during this time.
     ///
     /// `address` must be in flash, outside of the program, and a multiple of four.
     fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
@@ -94,32 +96,32 @@ impl Flash {
         self.end()
     }
 
-    /// Erases a sector and waits for it: 0.25 s for the smallest, 2 s at most.
+    /// Erases a sector and waits for the end: 0.25 s for the smallest sector, 2 s at most.
     pub(super) fn erase(&mut self, sector: u8) -> Result<(), Error> {
         self.start_erase(sector)?;
         self.wait(ERASE_POLLS)?;
         self.end()
     }
 
-    /// Begins to erase a sector; [`Flash::end`] follows when the controller is no longer busy.
+    /// Starts the erase of a sector. The caller calls [`Flash::end`] when the controller is no longer busy.
     pub(super) fn start_erase(&mut self, sector: u8) -> Result<(), Error> {
         self.prepare()?;
-        // SAFETY: SNB takes any number of a sector.
+        // SAFETY: SNB takes any sector number.
         self.0.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
         self.0.cr().modify(|_, w| w.strt().set_bit());
         cortex_m::asm::dsb();
         Ok(())
     }
 
-    /// Whether an operation is going on.
+    /// Whether an operation is under way.
     pub(super) fn is_busy(&self) -> bool {
         self.0.sr().read().bsy().bit_is_set()
     }
 
-    /// Forgets old errors and unlocks the controller for one operation.
+    /// Clears old errors and unlocks the controller for one operation.
     fn prepare(&mut self) -> Result<(), Error> {
         self.wait(PROGRAM_POLLS)?;
-        // SAFETY: SR takes 1 for flags to clear.
+        // SAFETY: SR takes a 1 for each flag to clear.
         self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
         if self.0.cr().read().lock().bit_is_set() {
             for key in KEYS {
@@ -137,8 +139,8 @@ impl Flash {
         if flags == 0 { Ok(()) } else { Err(Error::Flags(flags)) }
     }
 
-    /// Waits for the end of the operation under way. An operation that does not end is an error. The controller is locked then; the
-    /// next operation waits for the same flag again.
+    /// Waits for the end of the operation under way. An operation that does not end is an error; the controller is then
+    /// locked, and the next operation waits for the same flag again.
     fn wait(&self, polls: u32) -> Result<(), Error> {
         if (0..polls).any(|_| !self.is_busy()) {
             return Ok(());
@@ -147,7 +149,8 @@ impl Flash {
         Err(Error::Busy)
     }
 
-    /// Empties the data cache, which may hold words from before the operation (RM0390, 3.4.2). The cache must be off for that.
+    /// Empties the data cache, which may hold words from before the operation (RM0390, 3.4.2). The cache must be off
+    /// for this.
     pub(super) fn forget_cached(&mut self) {
         let was_on = self.0.acr().read().dcen().bit_is_set();
         self.0.acr().modify(|_, w| w.dcen().clear_bit());

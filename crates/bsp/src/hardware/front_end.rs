@@ -1,8 +1,8 @@
-//! What TIM3 paces: the scans of the ADC, and the copies of the encoder's count at the start of each scan.
+//! The parts that TIM3 drives: the scans of the ADC, and the copies of the encoder's count at the start of each scan.
 //!
-//! Nothing in it may stop for good, and the two may not get out of step. Both are looked after once a millisecond, and both heal
-//! in the same way: everything that TIM3 paces is set up anew and started together ([`Event::Sampling`]). The counter of the
-//! encoder counts on meanwhile, so no position is lost.
+//! Neither part may stop for good, and the two must stay in step. Both are checked once a millisecond, and both are
+//! repaired in the same way: everything that TIM3 drives is set up again and restarted together ([`Event::Sampling`]).
+//! The encoder's counter continues in the meantime, so no position is lost.
 
 use stm32f4xx_hal::rcc::Rcc;
 
@@ -16,13 +16,13 @@ pub struct FrontEnd {
     sampling: Sampling,
     encoder: Encoder,
     losses: &'static Losses,
-    /// Somebody has asked for a millisecond that was not there, and none has come since.
+    /// The last call of `take` found no completed millisecond.
     is_missed: bool,
-    /// The sampling was started anew since the last reading.
+    /// The sampling was restarted after the last reading.
     has_gap: bool,
 }
 
-/// One millisecond of both.
+/// Readings of one millisecond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reading {
     /// Readings of the analogue inputs.
@@ -43,16 +43,16 @@ impl FrontEnd {
         FrontEnd { sampling, encoder, losses, is_missed: false, has_gap: false }
     }
 
-    /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this is
-    /// the last thing that an initialisation does.
+    /// Starts the sampling. The first interrupt comes a millisecond later and must not find interrupts masked, so this
+    /// is the last step of an initialisation.
     pub fn start(&mut self) {
         self.is_missed = false;
         self.sampling.start();
     }
 
-    /// The millisecond that has just ended; `None` when there is none. To be called at each interrupt, and also by whoever
-    /// has not seen one for some milliseconds. When that happens twice in a row, everything is started anew: the first
-    /// time, the interrupt may just have come.
+    /// The millisecond that has just ended; `None` if there is none. To be called at each interrupt, and also by a task
+    /// that has not seen an interrupt for some milliseconds. After two calls in a row without a millisecond, everything
+    /// is restarted; a single one proves nothing, because the interrupt may just have come.
     pub fn take(&mut self) -> Option<Reading> {
         let Some(sums) = self.sampling.take() else {
             if core::mem::replace(&mut self.is_missed, true) {
@@ -65,7 +65,7 @@ impl FrontEnd {
         let counter = if self.is_in_step() {
             self.encoder.at_last_scan(sums.half)
         } else {
-            // The copies are those of other scans. This count is right and at most a scan younger.
+            // The copies belong to other scans. The present count is right, and at most one scan newer.
             self.restart();
             self.encoder.now()
         };
@@ -73,7 +73,7 @@ impl FrontEnd {
         Some(Reading { sums, counted: Counted { counter, index, has_gap } })
     }
 
-    /// A copy that comes while the three places are read decides nothing.
+    /// Whether copies and conversions are in step. If a copy comes while the three values are read, the answer is yes.
     fn is_in_step(&self) -> bool {
         let copies_left = self.encoder.copies_left();
         let conversions_left = self.sampling.conversions_left();

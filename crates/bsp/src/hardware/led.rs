@@ -10,7 +10,7 @@ impl Led {
         Led(pin.into_push_pull_output())
     }
 
-    /// Switches it.
+    /// Switches the LED.
     pub fn set(&mut self, on: bool) {
         self.0.set_state(on.into());
     }

@@ -1,4 +1,4 @@
-//! Bring-up of the board for the bootloader, in two steps: what the decision at every start needs, and the bus.
+//! Bring-up of the board for the bootloader, in two steps: the parts for the decision at every start, and the bus.
 
 use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, Peripherals, RCC, TIM2};
 use stm32f4xx_hal::prelude::*;
@@ -17,15 +17,15 @@ use crate::reset_cause::ResetCause;
 pub struct Loader {
     /// Why the chip was reset. The flags are left for the application.
     pub reset: Reset,
-    /// Runs already.
+    /// Already running.
     pub watchdog: StartUpWatchdog,
-    /// What an update works on.
+    /// The flash that an update uses.
     pub flash: ProgramFlash,
-    /// For the bus, if it comes to that.
+    /// The parts for the bus, if the bootloader stays.
     pub rest: Rest,
 }
 
-/// What is not started yet.
+/// Parts that are not started yet.
 pub struct Rest {
     rcc: Rcc,
     can: CAN1,
@@ -33,7 +33,7 @@ pub struct Rest {
     ports: (GPIOA, GPIOB),
 }
 
-/// Everything for the bus.
+/// The parts for the bus.
 pub struct Bus {
     /// The interrupt of the time base.
     pub time: TimeInterrupt,
@@ -41,16 +41,16 @@ pub struct Bus {
     pub alarm: Alarm,
     /// The CAN controller, not yet on the bus.
     pub can: Controller,
-    /// Its transmit mailboxes.
+    /// The transmit mailboxes.
     pub transmitter: Transmitter,
     /// The status LED.
     pub led: Led,
 }
 
 impl Loader {
-    /// The watchdog comes first: a crystal that does not start ends in a reset too. Before anything is looked at, all that is not code of
-    /// the bootloader becomes data. The clock is raised for the CRC of the
-    /// application, which takes nine times as long at the 16 MHz of a reset.
+    /// The watchdog comes first, so that a crystal that does not start also ends in a reset. Next, all memory but the
+    /// code of the bootloader is made non-executable, before anything is examined. The clock is raised because the CRC
+    /// of the application takes nine times as long at the 16 MHz of a reset.
     #[must_use]
     pub fn start(device: Peripherals) -> Loader {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
@@ -66,7 +66,7 @@ impl Loader {
 }
 
 impl Rest {
-    /// The bootloader stays: starts time base, CAN controller and LED, and forgets why the chip was reset.
+    /// The bootloader stays: starts time base, CAN controller and LED, and clears the cause of the reset.
     #[must_use]
     pub fn start(mut self) -> Bus {
         self.rcc.csr().modify(|_, w| w.rmvf().set_bit());
@@ -76,7 +76,7 @@ impl Rest {
         Bus { time, alarm, can, transmitter, led: Led::new(gpioa.pa5) }
     }
 
-    /// The application starts: it finds the clocks as a reset leaves them.
+    /// The application starts: restores the reset state of the clocks.
     pub fn stop(self) {
         clock_tree::lower(&self.rcc);
     }

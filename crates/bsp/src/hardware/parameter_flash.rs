@@ -8,7 +8,7 @@ use crate::flash_area::FlashArea;
 use crate::losses::{Event, Losses};
 use crate::sectors;
 
-/// The controller for those two sectors.
+/// The flash controller, restricted to the sectors of the two pages.
 pub struct ParameterFlash {
     flash: Flash,
     area: FlashArea,
@@ -21,7 +21,7 @@ impl ParameterFlash {
         ParameterFlash { flash, area: FlashArea::new(pages.start, pages), losses }
     }
 
-    /// Reads in another area of the flash.
+    /// Reads from another area of the flash.
     pub(super) fn read_in(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         self.flash.read(area, offset, bytes)
     }

@@ -1,4 +1,5 @@
-//! The flash that an update works on: the security counter and the revoked keys, the application with its header, and staging.
+//! The flash that an update uses: the security counter and the revoked keys, the application with its header, and
+//! staging.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
 
@@ -7,14 +8,14 @@ use super::memory;
 use crate::flash_area::FlashArea;
 use crate::sectors;
 
-/// The controller for those sectors; the bootloader and the parameters cannot be reached with it. Offsets count from the
-/// start of the flash.
+/// The flash controller, restricted to these sectors: the bootloader and the parameters cannot be reached. Offsets
+/// count from the start of the flash.
 pub struct ProgramFlash {
     flash: Flash,
     area: FlashArea,
-    /// Nothing before it is ever erased.
+    /// The part that may be erased.
     erasable: FlashArea,
-    /// An erase was begun whose end nobody has seen.
+    /// An erase was started, and its end has not been seen yet.
     erases: bool,
 }
 

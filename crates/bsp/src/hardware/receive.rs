@@ -1,4 +1,4 @@
-//! A receive FIFO and the queue that its interrupt drains it into.
+//! A receive FIFO, and the queue into which its interrupt moves the frames.
 
 use canopen::{Frame, Instant};
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -9,13 +9,14 @@ use crate::filters::Fifo;
 use crate::losses::{Event, Losses};
 use crate::mailbox::Mailbox;
 
-/// Frames that wait for their task. The shortest frame takes 47 us at 1 Mbit/s, so the queue holds 1.5 ms of the densest traffic.
+/// Number of frames that can wait for their task. The shortest frame takes 47 us at 1 Mbit/s, so the queue holds 1.5 ms
+/// of the densest traffic.
 const CAPACITY: usize = 32;
 
 /// The queue between the interrupt and the task.
 pub type ReceiveQueue<const N: usize = CAPACITY> = Queue<Received, N>;
 
-/// A frame and when its interrupt came.
+/// A frame with the time of its interrupt.
 #[derive(Clone, Copy, Debug)]
 pub struct Received {
     /// The frame.
@@ -31,11 +32,11 @@ pub struct Receiver {
     lost: &'static Losses,
 }
 
-/// The task's side.
+/// The task's side of one FIFO.
 pub type Frames = Consumer<'static, Received>;
 
 impl Receiver {
-    /// The two sides of a FIFO.
+    /// Both sides of a FIFO.
     pub fn new<const N: usize>(
         fifo: Fifo,
         queue: &'static mut ReceiveQueue<N>,
@@ -45,11 +46,11 @@ impl Receiver {
         (Receiver { fifo, queue: producer, lost }, consumer)
     }
 
-    /// Moves all frames from the FIFO into the queue. The three places of the FIFO fill in 141 us at 1 Mbit/s. A frame that finds no
-    /// place in the FIFO or in the queue is counted ([`Event::Frame`]).
+    /// Moves all frames from the FIFO into the queue. The three places of the FIFO fill in 141 us at 1 Mbit/s. A frame
+    /// for which the FIFO or the queue has no room is counted ([`Event::Frame`]).
     pub fn drain(&mut self) {
         let at = Clock::now();
-        // Never so, but the type of the queue does not say it, and without a place it would divide by zero.
+        // Never true, but the type of the queue does not guarantee it, and a queue without places would divide by zero.
         if self.queue.capacity() == usize::MAX {
             return;
         }
@@ -71,7 +72,7 @@ impl Receiver {
         (now.fmp().bits() > 0).then(|| self.release())
     }
 
-    /// Reads the oldest frame and gives its place back.
+    /// Reads the oldest frame and releases its place.
     fn release(&mut self) -> Mailbox {
         let output = registers().rx(self.fifo as usize);
         let mailbox = Mailbox {
@@ -81,7 +82,7 @@ impl Receiver {
             rdhr: output.rdhr().read().bits(),
         };
         registers().rfr(self.fifo as usize).write(|w| w.rfom().set_bit());
-        // The next frame is at the output when the hardware has cleared the request, a few clocks later.
+        // The next frame is at the output once the hardware has cleared the request, a few clocks later.
         while registers().rfr(self.fifo as usize).read().rfom().bit_is_set() {}
         mailbox
     }

@@ -1,4 +1,4 @@
-//! RAM that survives a reset, at one address in both images (memory.x, RETAINED), and never initialised.
+//! RAM that survives a reset, at the same address in both images (memory.x, RETAINED), and never initialised.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -7,7 +7,7 @@ use update::{Crashes, Pair, Proof};
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
 
-/// The content. Both images must agree on the layout, so the layout changes with a new bootloader only.
+/// The content. Both images must agree on the layout, so the layout can change only with a new bootloader.
 #[repr(C)]
 struct Retained {
     handover: [AtomicU32; 2],
@@ -15,11 +15,11 @@ struct Retained {
     crash: [AtomicU32; WORDS],
     proven: [AtomicU32; 2],
     bootloader: AtomicU32,
-    /// A word that says that they are there, challenge and response.
+    /// A mark that says whether the rest is valid, then challenge and response.
     authorisation: [AtomicU32; 5],
 }
 
-/// `used` keeps the compiler from taking the initial values for granted: a reset does not write them.
+/// `used` keeps the compiler from assuming the initial values, which a reset does not write.
 #[used]
 #[unsafe(link_section = ".retained")]
 static RETAINED: Retained = Retained {
@@ -31,12 +31,12 @@ static RETAINED: Retained = Retained {
     authorisation: [const { AtomicU32::new(0) }; 5],
 };
 
-/// The word by which a bootloader for development says that it is one: 'DEVL'.
+/// The mark of a development bootloader: 'DEVL'.
 const DEVELOPMENT: u32 = u32::from_be_bytes(*b"DEVL");
-/// The word by which a bootloader says that it has a key for those who change the program: 'GARD'.
+/// The mark of a bootloader with an authorisation key for program changes: 'GARD'.
 const GUARDED: u32 = u32::from_be_bytes(*b"GARD");
 
-/// The note of the other image; `None` when there is none since power-on.
+/// The note of the other image; `None` if none was left since power-on.
 #[must_use]
 pub fn handover() -> Option<Handover> {
     Handover::open(&load(&RETAINED.handover))
@@ -49,7 +49,7 @@ pub fn hand_over(note: &Handover) {
     store(&RETAINED.handover, words);
 }
 
-/// How often the application has crashed since it last confirmed itself.
+/// Number of crashes of the application since it last confirmed itself.
 #[must_use]
 pub fn crashes() -> Crashes {
     Crashes::from_word(RETAINED.crashes.load(Ordering::Relaxed))
@@ -60,41 +60,41 @@ pub fn set_crashes(crashes: Crashes) {
     RETAINED.crashes.store(crashes.word(), Ordering::Relaxed);
 }
 
-/// The image whose signature was found good since power-on, by the CRC of its header.
+/// The image whose signature was verified since power-on, identified by the CRC of its header.
 #[must_use]
 pub fn proof() -> Proof {
     let [crc, complement] = load(&RETAINED.proven);
     if complement == !crc { Proof::Of(crc) } else { Proof::None }
 }
 
-/// Keeps the word of [`update::boot_sealed`].
+/// Stores the word of [`update::boot_sealed`].
 pub fn set_proof(seal: u32) {
     store(&RETAINED.proven, [seal, !seal]);
 }
 
-/// The word as it is now, whatever it is.
+/// The present word, whatever its value.
 pub(super) fn seal() -> u32 {
     let [seal, _] = load(&RETAINED.proven);
     seal
 }
 
-/// Power came: nothing is proven.
+/// Forgets the verified image, at power-on.
 pub fn forget_proof() {
     store(&RETAINED.proven, [0, 0]);
 }
 
-/// Leaves word whether this bootloader is one for development.
+/// Leaves a note whether this is a development bootloader.
 pub fn set_development(is_for_development: bool) {
     RETAINED.bootloader.store(if is_for_development { DEVELOPMENT } else { 0 }, Ordering::Relaxed);
 }
 
-/// Whether the bootloader that has started the application is one for development, which starts what nobody has signed.
+/// Whether the application was started by a development bootloader, which also starts unsigned images.
 #[must_use]
 pub fn is_development() -> bool {
     RETAINED.bootloader.load(Ordering::Relaxed) == DEVELOPMENT
 }
 
-/// Challenge and response of this start, where the bootloader has a key for them.
+/// Challenge and response of this start, if the bootloader has an authorisation key.
 #[must_use]
 pub fn authorisation() -> Option<Pair> {
     let [mark, a, b, c, d] = load(&RETAINED.authorisation);
@@ -107,7 +107,7 @@ pub fn set_authorisation(pair: &Pair) {
     store(&RETAINED.authorisation, [GUARDED, a, b, c, d]);
 }
 
-/// Everybody may change the program.
+/// Removes challenge and response: anybody may change the program.
 pub fn forget_authorisation() {
     let [mark, ..] = &RETAINED.authorisation;
     mark.store(0, Ordering::Relaxed);

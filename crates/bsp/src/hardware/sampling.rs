@@ -1,5 +1,6 @@
-//! The sampling front end: TIM3 starts a scan of ADC1 16,000 times a second, DMA2 collects it, and the interrupt comes
-//! once a millisecond. When each conversion begins is decided by hardware alone; the core can only be late to collect.
+//! The sampling front end: TIM3 starts a scan of ADC1 16,000 times a second, DMA2 collects the results, and an
+//! interrupt comes once a millisecond. Hardware alone decides when each conversion begins; the core can only collect
+//! the results late.
 
 use core::sync::atomic::AtomicU32;
 
@@ -37,15 +38,15 @@ struct Conversion {
     time: SamplingTime,
 }
 
-/// An SMPx code, and the cycles that it stands for.
+/// An SMPx code and its number of cycles.
 #[derive(Clone, Copy)]
 struct SamplingTime {
     code: u8,
     cycles: u32,
 }
 
-/// 28 cycles suit a source below 15 kohm, 480 give the internal sensors the 10 us they need (STM32F446 datasheet, 6.3.22 to
-/// 6.3.24).
+/// 28 cycles are enough for a source below 15 kohm; 480 cycles give the internal sensors the necessary 10 us (STM32F446
+/// datasheet, 6.3.22 to 6.3.24).
 const EXTERNAL: SamplingTime = SamplingTime { code: 2, cycles: 28 };
 const INTERNAL: SamplingTime = SamplingTime { code: 7, cycles: 480 };
 /// Cycles of the successive approximation, 12 bits.
@@ -62,10 +63,11 @@ const _: () = {
     assert!(SCANS as u32 * PERIOD as u32 == 72_000, "the interrupt must come once a millisecond");
 };
 
-/// How often to look whether the stream has stopped: it ends the transfer that it is at, some ten clocks.
+/// Number of polls for a stream to stop: the stream ends its present transfer, some ten clocks.
 const STOP_POLLS: u32 = 1_000;
 
-/// What the DMA controller writes and the core reads, two conversions in a word. Atomic, because two bus masters share it.
+/// Written by the DMA controller and read by the core, two conversions in a word. Atomic, because two bus masters share
+/// the memory.
 static BUFFER: [AtomicU32; 2 * WORDS] = [const { AtomicU32::new(0) }; 2 * WORDS];
 
 /// Sums over the scans of one millisecond.
@@ -73,9 +75,9 @@ static BUFFER: [AtomicU32; 2 * WORDS] = [const { AtomicU32::new(0) }; 2 * WORDS]
 pub struct Sums {
     /// Per channel: pressure, its supply, thermistor, temperature sensor, VREFINT.
     pub channels: [u32; CHANNELS],
-    /// Which half of the buffers they come from.
+    /// The half of the buffers that the sums come from.
     pub(super) half: usize,
-    /// The millisecond before it was given up.
+    /// The millisecond before was dropped.
     pub(super) is_second: bool,
 }
 
@@ -105,7 +107,7 @@ pub(crate) struct Parts {
 }
 
 impl Sampling {
-    /// Configures everything, in the order of the flow of data from its end: a trigger finds all of it ready.
+    /// Configures everything from the end of the data flow to its start, so that a trigger finds all parts ready.
     pub(super) fn new(parts: Parts, losses: &'static Losses, rcc: &mut Rcc) -> Sampling {
         let Parts { adc, common, dma, timer, pressure, supply, thermistor } = parts;
         DMA2::enable(rcc);
@@ -119,18 +121,19 @@ impl Sampling {
         Sampling { adc, dma, timer, losses, _pins: (pressure, supply, thermistor) }
     }
 
-    /// The timer that starts the scans, for the copies of the encoder's count at the same instants.
+    /// The timer that starts the scans, also used for the copies of the encoder's count at the same instants.
     pub(super) fn scans(&self) -> &TIM3 {
         &self.timer
     }
 
-    /// Begins to sample. The first interrupt comes a millisecond later.
+    /// Starts the sampling. The first interrupt comes a millisecond later.
     pub(super) fn start(&mut self) {
         self.timer.cr1().write(|w| w.cen().set_bit());
     }
 
-    /// Stops everything and sets it up anew, whatever has gone wrong: an overrun of the ADC, which then asks for nothing more
-    /// (RM0390, 13.8.1), a stream that a bus error has switched off, a lost request. [`Sampling::start`] follows.
+    /// Stops everything and sets it up again, whatever the error: an overrun of the ADC, which then requests no more
+    /// transfers (RM0390, 13.8.1), a stream that a bus error has switched off, a lost request. To be followed by
+    /// [`Sampling::start`].
     pub(super) fn set_up_again(&mut self) {
         self.timer.cr1().modify(|_, w| w.cen().clear_bit());
         self.timer.cnt().reset();
@@ -140,7 +143,7 @@ impl Sampling {
         prepare_adc(&self.adc);
     }
 
-    /// The sums of the millisecond that has just ended. `None` when there is none.
+    /// The sums of the millisecond that has just ended; `None` if there is none.
     pub(super) fn take(&mut self) -> Option<Sums> {
         let flags = self.dma.lisr().read();
         forget_flags(&self.dma);
@@ -154,13 +157,13 @@ impl Sampling {
         Some(Sums { channels: sums(words), half, is_second })
     }
 
-    /// Both halves are complete: the older one is being overwritten, so it is given up.
+    /// Both halves are complete. The older one is being overwritten, so it is dropped.
     fn latest_of_two(&self) -> usize {
         self.losses.count(Event::Millisecond);
         usize::from(self.conversions_left() > HALF)
     }
 
-    /// Conversions that are still to come in this round.
+    /// Number of conversions still to come in this round.
     pub(super) fn conversions_left(&self) -> usize {
         self.dma.st(0).ndtr().read().ndt().bits().into()
     }
@@ -175,7 +178,7 @@ fn forget_flags(dma: &DMA2) {
     dma.lifcr().write(|w| w.chtif0().set_bit().ctcif0().set_bit().cteif0().set_bit());
 }
 
-/// DMA2 stream 0, channel 0: ADC1 to the buffer, round and round, an interrupt at each half (RM0390, 9.3).
+/// DMA2 stream 0, channel 0: from ADC1 to the buffer in circular mode, with an interrupt at each half (RM0390, 9.3).
 fn prepare_dma(dma: &DMA2, adc: &ADC1) {
     let stream = dma.st(0);
     stream.cr().reset();
@@ -196,7 +199,7 @@ fn prepare_dma(dma: &DMA2, adc: &ADC1) {
     stream.cr().modify(|_, w| w.en().set_bit());
 }
 
-/// ADC1: scan on each trigger of TIM3, a DMA request for each conversion for ever (RM0390, 13.8.1).
+/// ADC1: a scan on each trigger of TIM3, and a DMA request for each conversion without end (RM0390, 13.8.1).
 fn prepare_adc(adc: &ADC1) {
     adc.cr1().write(|w| w.scan().set_bit());
     // SAFETY: any sampling time and any existing channel may be set.
@@ -222,7 +225,7 @@ fn prepare_timer(timer: &TIM3, rcc: &mut Rcc) {
     timer.cr2().write(|w| w.mms().update());
 }
 
-/// Value of the SMPR register that begins with channel `first`: the sampling times of the ten channels from there on.
+/// Value of the SMPR register that begins with channel `first`: the sampling times of ten channels.
 fn times(first: u8) -> u32 {
     let own = SCAN.iter().filter(|conversion| (first..first + 10).contains(&conversion.channel));
     own.fold(0, |register, Conversion { channel, time }| {

@@ -1,7 +1,7 @@
 //! The transmit mailboxes of CAN1 (RM0390, 30.7.1).
 //!
-//! The transmission of the crate bxcan is not used: bxcan panics at a mailbox number or a length that only a broken register could
-//! hold.
+//! The crate bxcan is not used for transmission: it panics at a mailbox number or a length that only a broken register
+//! could hold.
 
 use canopen::Frame;
 use stm32f4xx_hal::pac::can1::TX;
@@ -10,39 +10,41 @@ use super::can::registers;
 use crate::mailbox::{Mailbox, REMOTE};
 use crate::transmit_queue::{Mailboxes, Offer};
 
-/// TIxR: the place of the identifier and the request to transmit (RM0390, 30.9.3). Shifted, identifier and RTR are in the
-/// order in which the bus prefers them.
+/// TIxR: the place of the identifier, and the transmit request (RM0390, 30.9.3). In this register, identifier and RTR
+/// sort in the order of bus arbitration.
 const STID: u32 = 21;
 const TXRQ: u32 = 1 << 0;
 
-/// TSR of mailbox 0: transmission OK and abort request; those of the next mailbox are a byte further on (RM0390, 30.9.2).
+/// TSR of mailbox 0: transmission OK and abort request. The bits of the next mailbox are 8 bits higher (RM0390,
+/// 30.9.2).
 const TXOK: u32 = 1 << 1;
 const ABRQ: u32 = 1 << 7;
 
-/// How often to look whether a frame is taken back: a matter of a few clocks, unless its transmission has just begun.
+/// Number of polls for an abort: it takes a few clocks, unless the transmission has just begun.
 const ABORT_POLLS: u32 = 100;
 
 /// The transmit mailboxes.
 pub struct Transmitter {
-    /// A frame that was to be taken back, and the number of its mailbox. The transmission of the frame had just begun, so the end of
+    /// A frame whose abort was requested, and the number of its mailbox. Its transmission had just begun, so the end of
     /// the transmission decides whether the frame was sent.
     aborted: Option<(u32, Frame)>,
 }
 
 impl Transmitter {
-    /// The only one.
+    /// The only instance.
     pub(super) fn new() -> Transmitter {
         Transmitter { aborted: None }
     }
 
     /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
-    /// interrupts again.
+    /// raises the interrupt again.
     pub fn acknowledge(&mut self) {
         self.settle();
         registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
     }
 
-    /// Looks whether the transmission of the aborted frame has ended. A frame that was not sent goes back into its mailbox.
+    /// Checks whether the transmission of the aborted frame has ended. A frame that was not sent goes back into its
+    /// mailbox.
     fn settle(&mut self) {
         if let Some((number, frame)) = self.aborted.filter(|(number, _)| !is_aborting(*number)) {
             self.aborted = None;
@@ -52,7 +54,8 @@ impl Transmitter {
         }
     }
 
-    /// Puts a frame into the first mailbox, if that is free. For whoever uses no other: frames keep their order then.
+    /// Puts a frame into the first mailbox, if that is free. For a caller that uses no other mailbox, so that frames
+    /// keep their order.
     pub fn put(&mut self, frame: &Frame) -> bool {
         let is_free = registers().tsr().read().tme0().bit_is_set();
         if is_free {
@@ -63,8 +66,8 @@ impl Transmitter {
 }
 
 impl Mailboxes for Transmitter {
-    /// Among equal identifiers the hardware prefers the mailbox of the lower number, not the frame that came first, so a
-    /// frame waits for those of its own identifier.
+    /// Among equal identifiers the hardware sends the lowest mailbox number first, not the oldest frame. A frame is
+    /// therefore accepted only if it is more urgent than all pending ones.
     fn offer(&mut self, frame: &Frame) -> Offer {
         if self.aborted.is_some()
             || would_wait()
@@ -96,7 +99,7 @@ impl Mailboxes for Transmitter {
     }
 }
 
-/// Mailboxes with a frame that is not sent yet, with their numbers.
+/// Mailboxes with an unsent frame, with their numbers.
 fn pending() -> impl Iterator<Item = (u32, &'static TX)> {
     (0..).zip(registers().tx_iter()).filter(|(_, mailbox)| is_pending(mailbox))
 }
@@ -114,9 +117,9 @@ fn identifier(frame: &Frame) -> u32 {
     u32::from(frame.id()) << STID | if frame.is_remote() { REMOTE } else { 0 }
 }
 
-/// Whether taking back a frame would mean waiting. A frame leaves its mailbox at once while it waits, and at the end of its
-/// transmission once it is on the wire: after up to 13 ms at 10 kbit/s. So no frame is taken back while the controller transmits;
-/// the interrupt at the end of the transmission comes soon.
+/// Whether aborting a frame would mean waiting. A frame leaves its mailbox at once while it waits, but only at the end
+/// of the transmission once it is on the wire: after up to 13 ms at 10 kbit/s. No frame is therefore aborted while the
+/// controller transmits; the interrupt at the end of the transmission comes soon.
 fn would_wait() -> bool {
     let full = registers().tx_iter().all(is_pending);
     full && registers().msr().read().txm().bit_is_set()
@@ -133,10 +136,10 @@ fn content(mailbox: &TX) -> Option<Frame> {
     content.frame()
 }
 
-/// Asks for the frame in a mailbox to be given up. The mailbox is empty some clocks later, or at the end of a transmission that has
-/// just begun: see [`is_aborting`].
+/// Requests the abort of the frame in a mailbox. The mailbox is empty some clocks later, or at the end of a
+/// transmission that has just begun: see [`is_aborting`].
 fn abort(number: u32) {
-    // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
+    // SAFETY: the other bits of TSR are cleared by writing 1, so writing 0 leaves them unchanged.
     registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags_of(number)) });
     let _ = (0..ABORT_POLLS).find(|_| !is_aborting(number));
 }
@@ -149,7 +152,7 @@ fn is_sent(number: u32) -> bool {
     registers().tsr().read().bits() & TXOK << flags_of(number) != 0
 }
 
-/// Where the flags of a mailbox are in TSR.
+/// Position of a mailbox's flags in TSR.
 fn flags_of(number: u32) -> u32 {
     8 * (number % 3)
 }

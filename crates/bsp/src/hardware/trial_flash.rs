@@ -1,4 +1,4 @@
-//! The records of an update, as the application may reach them: to confirm itself, or to be taken back.
+//! Access of the application to the records of an update, to confirm itself or to be taken back.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
 use update::Trial;
@@ -9,7 +9,8 @@ use crate::flash_area::FlashArea;
 use crate::sectors;
 use crate::update_layout::LAYOUT;
 
-/// All that an update has, to be read. The last bytes of staging and of the kept image can be programmed, and nothing is erased.
+/// Read access to all areas of an update. Only the last bytes of staging and of the kept image can be programmed, and
+/// nothing can be erased.
 pub struct TrialFlash<'a>(&'a mut ParameterFlash);
 
 impl ParameterFlash {
@@ -19,7 +20,7 @@ impl ParameterFlash {
     }
 }
 
-/// The record that has a byte at `offset`.
+/// The record that contains `offset`.
 fn record(offset: u32) -> Result<FlashArea, Error> {
     let record = Trial::records(&LAYOUT).into_iter().find(|record| record.contains(&offset));
     let record = record.ok_or(NorFlashErrorKind::OutOfBounds)?;
@@ -51,7 +52,7 @@ impl update::Flash for TrialFlash<'_> {
         self.0.write_in(&record(offset)?, offset, bytes)
     }
 
-    /// Refused.
+    /// Always refused.
     fn start_erase(&mut self, _: u32) -> Result<(), Error> {
         Err(NorFlashErrorKind::OutOfBounds.into())
     }

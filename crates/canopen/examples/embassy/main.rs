@@ -1,7 +1,8 @@
 //! The device in an async main of embassy, for a Cortex-M4 without a board, and for the host.
 //!
-//! The CAN controller is two channels: its interrupts put received frames into one and send what is in the other. A
-//! board has its own time driver (embassy-stm32 brings one) and its own memory.x; here nothing keeps time.
+//! The CAN controller is represented by two channels: its receive interrupt would put frames into one, and its transmit
+//! interrupt would send the frames of the other. A board has its own time driver (embassy-stm32 brings one) and its own
+//! memory.x; here nothing keeps time.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 // The host has its own critical section.
@@ -30,7 +31,7 @@ const ROWS: &[Object] = canopen::rows!(
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 const MEASURED: Field = DICTIONARY.field(0x2000, 0);
 
-/// Frames from the receive interrupt and for the transmit interrupt.
+/// Frames from the receive interrupt; `SENT` has the frames for the transmit interrupt.
 static RECEIVED: Channel<CriticalSectionRawMutex, Frame, 32> = Channel::new();
 static SENT: Channel<CriticalSectionRawMutex, Frame, 32> = Channel::new();
 
@@ -49,7 +50,7 @@ impl Transmit for Queue {
 struct Thermometer;
 
 impl Application for Thermometer {
-    /// The value is taken with the SYNC that sends it.
+    /// The value is sampled with the SYNC that sends it.
     fn synchronised(&mut self, _counter: Option<u8>, image: &mut [u8]) {
         MEASURED.store(image, 215_i16.to_le_bytes());
     }
@@ -84,10 +85,10 @@ mod target {
     use core::sync::atomic::{AtomicU32, Ordering};
     use core::task::Waker;
 
-    // It brings the critical section.
+    // Provides the critical section.
     use cortex_m as _;
 
-    /// Counts looks at the clock: without a board there is no time.
+    /// Counts reads of the clock: without a board there is no time.
     struct NoClock(AtomicU32);
 
     impl embassy_time_driver::Driver for NoClock {

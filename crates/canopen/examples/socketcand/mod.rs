@@ -26,7 +26,7 @@ impl Bus {
         Ok(bus_of)
     }
 
-    /// The next base frame; `None` when there is none in this time.
+    /// The next base frame; `None` if none arrives in this time.
     pub(crate) fn receive(&mut self, patience: Duration) -> io::Result<Option<Frame>> {
         Ok(self.message(patience)?.as_deref().and_then(parse))
     }
@@ -50,7 +50,7 @@ impl Bus {
     }
 }
 
-/// `frame ID TIME BYTES`
+/// Parses `frame ID TIME BYTES`.
 fn parse(message: &str) -> Option<Frame> {
     let mut words = message.split_ascii_whitespace();
     let ("frame", id, _) = (words.next()?, words.next()?, words.next()?) else { return None };

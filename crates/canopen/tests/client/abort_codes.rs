@@ -1,4 +1,4 @@
-//! Abort codes in words.
+//! Texts of abort codes.
 
 use canopen::client::sdo::AbortCode;
 use canopen::sdo::Abort;

@@ -1,5 +1,5 @@
-//! Servers that want to keep a client busy for ever, and servers that say anything. No transfer takes longer than its
-//! bound, and none panics.
+//! Servers that try to keep a client busy for ever, and servers that send random data. No transfer takes longer than
+//! its limit, and none panics.
 
 use canopen::client::sdo::{BlockDownload, BlockUpload, Buffer, Download, Error, Upload};
 use canopen::client::{Service, lss};
@@ -10,7 +10,7 @@ use proptest::test_runner::RngSeed;
 
 use crate::server::{Device, NODE, OBJECT, Outcome, once, run};
 
-/// The bound of a transfer, and the last frames of it.
+/// The limit of a transfer, plus the time of its last frames.
 const BOUND: u64 = 10_000_000 + 1_000;
 
 fn bounded(service: &mut impl Service<Output = Outcome>, device: &mut impl Device) -> Outcome {
@@ -97,13 +97,13 @@ fn blocks_that_never_arrive_come_to_an_end() {
     assert_eq!(bounded(&mut transfer, &mut device), Err(Error::Unexpected));
 }
 
-/// A server that answers every frame with some of these.
+/// A server that answers each frame with the next of these answers.
 fn parrot(answers: Vec<Vec<[u8; 8]>>) -> impl FnMut([u8; 8]) -> Vec<[u8; 8]> {
     let mut answers = answers.into_iter();
     move |_| answers.next().unwrap_or_default()
 }
 
-/// Anything, but often with what a client looks at first.
+/// Random answers, often with a command byte that a client checks first.
 fn answer() -> impl Strategy<Value = [u8; 8]> {
     let commands =
         prop_oneof![Just(0x60_u8), Just(0x41), Just(0x43), Just(0xA4), Just(0xA2), Just(0xC6), any::<u8>()];

@@ -1,4 +1,4 @@
-//! The master against slaves made of the messages of the protocol.
+//! The LSS master against slaves that are built from the protocol's messages.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use canopen::{Duration, Frame, Instant, NodeId};
 
 const OPTIONS: Options = Options { timeout: Duration::from_millis(10), retries: 2 };
 
-/// Slaves without a node-ID, known by their identities; answers with these numbers are lost.
+/// Slaves without a node-ID, known by their identities. Answers with these numbers are lost.
 struct Slaves {
     waiting: Vec<(Identity, u8)>,
     selected: Option<Identity>,
@@ -97,7 +97,7 @@ fn fastscan_of_nobody_finds_nobody() {
     assert_eq!(run(Fastscan::new(OPTIONS), &mut Slaves::new(&[], 0..0)), Ok(None));
 }
 
-/// Whichever answer is lost: the identity is right in the end.
+/// Whichever answer is lost, the identity found is right.
 #[test]
 fn a_lost_answer_costs_time_and_nothing_else() {
     for lost in 1..90 {

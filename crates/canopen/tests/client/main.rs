@@ -1,4 +1,4 @@
-//! The client against servers and slaves that are scripted: good ones, bad ones, and ones that say anything.
+//! The client against scripted servers and slaves: correct ones, faulty ones, and ones that send random data.
 
 mod abort_codes;
 mod hostile;

@@ -1,4 +1,4 @@
-//! A server made of the messages of the protocol, and a bus on which frames can be lost, doubled and changed.
+//! A server built from the protocol's messages, and a bus on which frames can be lost, doubled and changed.
 
 use canopen::client::sdo::{Error, Options};
 use canopen::client::{Service, Step};
@@ -11,14 +11,14 @@ use crc::{CRC_16_XMODEM, Crc};
 pub(crate) const NODE: NodeId = NodeId::new(5).expect("a node-ID");
 pub(crate) const OBJECT: Multiplexer = Multiplexer { index: 0x2000, sub: 3 };
 
-/// A second for an answer, ten in all, no retry.
+/// A second for each answer, ten seconds in all, no retry.
 pub(crate) fn once() -> Options {
     Options { retries: 0, ..Options::default() }
 }
 
-/// Whatever is at the other end of the bus.
+/// The device at the other end of the bus.
 pub(crate) trait Device {
-    /// What it answers to a frame.
+    /// The answers to a frame.
     fn answer(&mut self, request: [u8; 8]) -> Vec<[u8; 8]>;
 }
 
@@ -28,7 +28,7 @@ impl<F: FnMut([u8; 8]) -> Vec<[u8; 8]>> Device for F {
     }
 }
 
-/// Runs a service on a bus where a frame takes 100 us. What it came to, when, and what it sent.
+/// Runs a service on a bus where a frame takes 100 us. Returns the outcome, the time of the end, and the frames sent.
 pub(crate) fn run<S: Service>(service: &mut S, device: &mut impl Device) -> (S::Output, Instant, Vec<Frame>) {
     let (mut now, mut sent, mut answers) = (Instant(0), vec![], std::collections::VecDeque::new());
     loop {
@@ -54,14 +54,14 @@ pub(crate) fn run<S: Service>(service: &mut S, device: &mut impl Device) -> (S::
 #[derive(Default)]
 pub(crate) struct Server {
     pub(crate) value: Vec<u8>,
-    /// Says nothing of the size.
+    /// The server does not indicate the size.
     pub(crate) is_sizeless: bool,
-    /// How many segments it wants in a block of a download.
+    /// Number of segments that the server asks for in a block of a download.
     pub(crate) block_size: u8,
     pub(crate) received: Vec<u8>,
     pub(crate) place: usize,
     pub(crate) toggle: bool,
-    /// Segments of the block that have come.
+    /// Number of segments received in this block.
     pub(crate) sequence: u8,
     pub(crate) is_in_block: bool,
     pub(crate) is_last: bool,

@@ -1,4 +1,4 @@
-//! All transfers of all lengths, and what becomes of frames that are lost, doubled or wrong.
+//! All transfers of many lengths, and the effect of lost, doubled and wrong frames.
 
 use canopen::Instant;
 use canopen::client::Service;
@@ -53,7 +53,7 @@ fn values_of_any_length_both_ways() {
     }
 }
 
-/// Zeros in blocks of one segment: all segments are equal, and none may be taken for a copy of another.
+/// Zeros in blocks of one segment: all segments are equal, and none may be taken for a repetition.
 #[test]
 fn equal_segments_count_each() {
     let options = Options { block_size: BlockSize::new(1).unwrap(), ..once() };
@@ -108,7 +108,7 @@ fn an_answer_that_is_lost_or_doubled_does_no_harm() {
     }
 }
 
-/// Within a block of a download segments are lost: they come again in the next block.
+/// Segments lost within a block of a download are sent again in the next block.
 #[test]
 fn lost_segments_are_sent_again() {
     for lost in 1..=15 {
@@ -116,7 +116,7 @@ fn lost_segments_are_sent_again() {
         let mut lossy = |request: [u8; 8]| {
             let is_segment = matches!(request[0] & 0x7F, 1..=4);
             segments += usize::from(is_segment);
-            // The last one of a block must arrive: a server waits for it.
+            // The last segment of a block must arrive, because a server waits for it.
             let is_end = request[0] & 0x80 != 0 || request[0] & 0x7F == 4;
             if is_segment && segments == lost && !is_end { vec![] } else { server.answer(request) }
         };
@@ -136,7 +136,7 @@ fn a_refusal_ends_a_transfer_at_once_and_is_not_answered() {
     assert_eq!(sent.len(), 1);
 }
 
-/// An abort message for another object is a late one.
+/// An abort message for another object belongs to an earlier transfer.
 #[test]
 fn a_late_abort_message_is_passed_over() {
     let mut server = Server::new(&[1, 2]);
@@ -148,7 +148,7 @@ fn a_late_abort_message_is_passed_over() {
     assert_eq!(upload(&mut late, once()).1, [1, 2]);
 }
 
-/// A server that does not know blocks may name the object of the transfer before.
+/// A server without block transfers may name the object of the previous transfer.
 #[test]
 fn a_request_that_is_not_understood_is_refused_whatever_object_is_named() {
     let mut simple = |_: [u8; 8]| {

@@ -1,4 +1,4 @@
-//! The application of the device under test: it keeps what it is told, and tells what a test gives it.
+//! The application of the device under test: it records calls, and provides the values that a test sets.
 
 use std::collections::VecDeque;
 
@@ -29,10 +29,10 @@ pub(crate) enum Told {
     Error(ErrorClass),
 }
 
-/// Takes 4711 and nothing else at 6102h, and keeps a domain of up to 5000 bytes.
+/// Accepts only 4711 at 6102h, and keeps a domain of up to 5000 bytes.
 #[derive(Default)]
 pub(crate) struct Numbers {
-    /// 1F80h, as if it came from a store.
+    /// 1F80h, as if from a store.
     pub(crate) start_up: u8,
     pub(crate) domain: Vec<u8>,
     pub(crate) downloads: usize,
@@ -44,11 +44,11 @@ pub(crate) struct Numbers {
     pub(crate) told: Vec<Told>,
     /// The TPDO whose frames are events; 0 for none.
     pub(crate) event_tpdo: u16,
-    /// The value of the event that was told last: each change of 6000h:1 is one.
+    /// The value of the last sent event: each change of 6000h:1 is an event.
     pub(crate) last_event: Option<[u8; 4]>,
-    /// Events that wait, instead: the values of 6000h:1 to tell.
+    /// Waiting events, used instead: the values of 6000h:1 to send.
     pub(crate) events: VecDeque<[u8; 4]>,
-    /// An object that no multiplexed TPDO tells to all nodes.
+    /// An object that multiplexed TPDOs do not send to all nodes.
     pub(crate) not_told: Option<Multiplexer>,
 }
 

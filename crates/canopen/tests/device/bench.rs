@@ -1,4 +1,4 @@
-//! A device, a queue that records, the time, and a client that talks to the device.
+//! A device, a recording queue, the time, and a client that talks to the device.
 
 use std::collections::VecDeque;
 
@@ -16,10 +16,10 @@ use crate::rows::ROWS;
 pub(crate) use crate::application::{PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL, Told, UNEXPECTED_RESET};
 pub(crate) use crate::rows::{DICTIONARY, rows};
 
-/// A transmit queue that keeps all it gets, as long as it has room.
+/// A transmit queue that keeps all frames, as long as it has room.
 pub(crate) struct Queue {
     pub(crate) frames: Vec<Frame>,
-    /// Identifiers of those that came as states.
+    /// Identifiers of the frames sent as states.
     pub(crate) states: Vec<u16>,
     pub(crate) room: usize,
 }
@@ -50,13 +50,13 @@ pub(crate) struct Bench {
     pub(crate) device: canopen::device!(Numbers, ROWS),
     pub(crate) out: Queue,
     pub(crate) now: Instant,
-    /// What the device left to its caller.
+    /// Actions that the device has left to its caller.
     actions: VecDeque<Action>,
     parameters: bool,
 }
 
 impl Bench {
-    /// A device that has booted and whose boot-up message is out of the way.
+    /// A device that has booted and whose boot-up message has been taken.
     pub(crate) fn booted() -> Bench {
         let mut bench = Bench::unstarted();
         bench.start();
@@ -98,7 +98,7 @@ impl Bench {
         self.follow(next);
     }
 
-    /// Keeps what follows from a call. What waits is handed over by the next one.
+    /// Keeps the result of a call. Waiting actions are returned by the next call.
     fn follow(&mut self, next: Next) -> Instant {
         self.parameters |= next.parameters;
         match next.action {
@@ -110,7 +110,7 @@ impl Bench {
         }
     }
 
-    /// The next thing that was left to the caller.
+    /// The next action that was left to the caller.
     pub(crate) fn take_action(&mut self) -> Option<Action> {
         self.poll();
         self.actions.pop_front()
@@ -145,7 +145,7 @@ impl Bench {
         self.follow(next);
     }
 
-    /// What the application was told since the last call.
+    /// Calls of the application since the last call of this function.
     pub(crate) fn told(&mut self) -> Vec<Told> {
         std::mem::take(&mut self.device.application_mut().told)
     }
@@ -160,7 +160,7 @@ impl Bench {
         self.take().iter().map(|frame| (frame.id(), frame.data().to_vec())).collect()
     }
 
-    /// Hands a frame to both halves, as filters would not.
+    /// Gives a frame to both halves, which acceptance filters would not.
     pub(crate) fn receive(&mut self, frame: Frame) {
         let next = self.device.on_frame(&frame, self.now, &mut self.out);
         self.follow(next);
@@ -180,7 +180,7 @@ impl Bench {
         self.receive(Frame::new(0x80, &[]).unwrap());
     }
 
-    /// Lets time pass, from deadline to deadline as the firmware does.
+    /// Lets time pass, from deadline to deadline as in the firmware.
     pub(crate) fn run(&mut self, span: Duration) {
         let end = self.now + span;
         loop {
@@ -193,7 +193,7 @@ impl Bench {
         }
     }
 
-    /// Runs and gives the instants at which frames with this identifier were sent, from now on.
+    /// Runs for `span` and returns the instants at which frames with this identifier were sent.
     pub(crate) fn times_of(&mut self, id: u16, span: Duration) -> Vec<u64> {
         let (start, end) = (self.now, self.now + span);
         let mut times = vec![];
@@ -227,7 +227,7 @@ impl Bench {
         Some(Response::parse(data).expect("no valid response"))
     }
 
-    /// Hands a request to the device; the responses, which are taken out of the queue.
+    /// Gives a request to the device and returns the responses, taken out of the queue.
     fn respond(&mut self, request: Frame) -> Vec<Frame> {
         let before = self.take();
         self.receive(request);
@@ -237,12 +237,12 @@ impl Bench {
         responses
     }
 
-    /// Reads a value; the abort code where the device refuses.
+    /// Reads a value; the abort code if the device refuses.
     pub(crate) fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
         exchange::read(ID, Multiplexer { index, sub }, |request| self.respond(request))
     }
 
-    /// Writes a value; the abort code where the device refuses.
+    /// Writes a value; the abort code if the device refuses.
     pub(crate) fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), u32> {
         exchange::write(ID, Multiplexer { index, sub }, bytes, |request| self.respond(request))
     }
@@ -252,7 +252,7 @@ impl Bench {
     }
 }
 
-/// Property tests that take the same course each time.
+/// Property tests with the same cases each time.
 pub(crate) fn repeatable() -> ProptestConfig {
     ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }

@@ -1,4 +1,4 @@
-//! SDO block transfers: whole data, lost and repeated frames, and all that can be wrong.
+//! SDO block transfers: complete data, lost and repeated frames, and all possible errors.
 
 use crate::bench::{Bench, ID, repeatable};
 use canopen::sdo::{BlockEnd, BlockSegment, BlockSize, Multiplexer, Request, Response};
@@ -9,7 +9,7 @@ const DOMAIN: Multiplexer = Multiplexer { index: 0x6104, sub: 0 };
 const TEXT: Multiplexer = Multiplexer { index: 0x6103, sub: 0 };
 const RESPONSE: u16 = 0x580 + ID as u16;
 
-/// CRC-16/XMODEM bit by bit, as CiA 301 defines it.
+/// CRC-16/XMODEM bit by bit, as defined in CiA 301.
 fn crc(data: &[u8]) -> u16 {
     data.iter().fold(0, |crc: u16, byte| {
         (0..8)
@@ -34,7 +34,7 @@ fn segment(data: &[u8], number: usize, sequence: u8) -> BlockSegment {
     BlockSegment { last, sequence: BlockSize::new(sequence).unwrap(), data: bytes }
 }
 
-/// What happens to a frame on its way.
+/// Fate of a frame on the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
     Arrives,
@@ -52,7 +52,7 @@ impl Client {
         Client { bench: Bench::booted(), fates: Box::new(std::iter::repeat(Fate::Arrives)) }
     }
 
-    /// Sends a segment, by its fate, and gives the answer if there is one.
+    /// Sends a segment, according to its fate, and returns the answer if there is one.
     fn send_segment(&mut self, segment: BlockSegment) -> Option<Response> {
         let frame = Frame::new(0x600 + u16::from(ID), &segment.encode()).unwrap();
         match self.fates.next().unwrap() {
@@ -69,7 +69,7 @@ impl Client {
         frames.first().map(|frame| Response::parse(frame.data().try_into().unwrap()).unwrap())
     }
 
-    /// A block download that sends again what was not acknowledged.
+    /// A block download that sends unacknowledged segments again.
     fn download(&mut self, at: Multiplexer, data: &[u8]) -> Response {
         let request = Request::BlockDownload { at, crc: true, size: Some(data.len() as u32) };
         let Some(Response::BlockDownload(_, size)) = self.bench.ask(request) else { panic!() };
@@ -86,7 +86,7 @@ impl Client {
             }
             match answer.or_else(|| self.wait()) {
                 Some(Response::BlockAcknowledge(sequence, _)) => done += usize::from(sequence),
-                // Nothing of the block has arrived: the server does not know of it.
+                // No segment of the block has arrived, so the server does not know of the block.
                 None => (),
                 other => return other.unwrap(),
             }
@@ -99,7 +99,7 @@ impl Client {
         self.response()
     }
 
-    /// A block upload that asks again for what is missing; the data and the end of the transfer.
+    /// A block upload that asks again for missing segments; returns the data and the end of the transfer.
     fn upload(&mut self, at: Multiplexer, block_size: u8) -> (Vec<u8>, BlockEnd) {
         let request = Request::BlockUpload { at, crc: true, block_size, threshold: 0 };
         let Some(Response::BlockUpload { crc: true, size: Some(size), .. }) = self.bench.ask(request) else {
@@ -133,7 +133,7 @@ impl Client {
         self.bench.receive(Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap());
     }
 
-    /// All that the server sends until it waits.
+    /// All frames of the server until it waits.
     fn block(&mut self) -> Vec<[u8; 8]> {
         self.bench.run(Duration::from_millis(200));
         let frames = self.bench.take().into_iter().filter(|frame| frame.id() == RESPONSE);
@@ -147,7 +147,7 @@ fn lossy(percent: u32) -> impl Strategy<Value = Vec<Fate>> {
         percent => Just(Fate::IsLost),
         percent => Just(Fate::ArrivesTwice),
     ];
-    // Not a multiple of any block's length, so that they do not meet the same segment again and again.
+    // Not a multiple of any block's length, so that the fates meet different segments in each block.
     prop::collection::vec(fate, 307)
 }
 
@@ -253,7 +253,7 @@ fn too_much_is_refused_when_it_comes() {
 fn segments_beyond_the_announced_size_are_refused_when_they_come() {
     for segments in [1, 2, 15, 16, 17, 120] {
         let mut client = Client::new();
-        // The next segment has a byte too much.
+        // The next segment has a byte too many.
         let size = u32::from(segments) * 7 + 6;
         client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(size) });
         for sequence in 1..=segments {

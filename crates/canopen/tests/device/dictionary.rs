@@ -1,4 +1,4 @@
-//! The run-time tables say what the rows say.
+//! The run-time tables agree with the rows.
 
 use crate::bench::{DICTIONARY, rows};
 use canopen::sdo::Abort;
@@ -13,7 +13,7 @@ fn every_row_has_its_entry_and_its_place() {
         let found = DICTIONARY.find(row.index, row.sub).unwrap();
         assert_eq!(found.field(), entry.field());
         assert_eq!(found.field(), DICTIONARY.field(row.index, row.sub));
-        // Each value has bytes of its own: after all are marked, none of them is left.
+        // Each value has its own bytes: after all are marked, no byte is left over.
         let len = entry.field().get(&image).len();
         entry.field().set(&mut image, &vec![0xA5; len]);
         offset += len;

@@ -1,4 +1,4 @@
-//! EMCY: messages, error register, the list 1003h and its COB-ID 1014h.
+//! EMCY: messages, error register, the list 1003h and the COB-ID 1014h.
 
 use crate::bench::{Bench, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL};
 use canopen::BusEvent;

@@ -1,4 +1,4 @@
-//! TPDOs that tell events: each once, in their order, whatever the inhibit time, the event timer and the queue say.
+//! TPDOs that send events: each event once, in order, whatever the inhibit time, the event timer and the queue.
 
 use crate::bench::Bench;
 use canopen::{Duration, Frame};
@@ -6,7 +6,7 @@ use canopen::{Duration, Frame};
 const TPDO: u16 = 0x185;
 const MS: Duration = Duration::from_millis(1);
 
-/// A device whose TPDO 1 tells events, with this type, inhibit time (100 us) and event timer (ms).
+/// A device whose TPDO 1 sends events, with this transmission type, inhibit time (100 us) and event timer (ms).
 fn configured(transmission: u8, inhibit: u16, event: u16) -> Bench {
     let mut bench = Bench::booted();
     bench.device.application_mut().event_tpdo = 1;
@@ -19,7 +19,7 @@ fn configured(transmission: u8, inhibit: u16, event: u16) -> Bench {
     bench
 }
 
-/// The same in Operational, with the event of the start out of the way.
+/// The same in Operational, after the event of the start.
 fn operational(transmission: u8, inhibit: u16, event: u16) -> Bench {
     let mut bench = configured(transmission, inhibit, event);
     bench.nmt(1);

@@ -59,7 +59,7 @@ fn an_idle_poll_gives_the_cached_deadline() {
     assert_eq!(bench.poll(), due);
 }
 
-/// A heartbeat of another node.
+/// Receives a heartbeat of another node.
 fn beat(bench: &mut Bench, node: u16) {
     bench.receive(Frame::new(0x700 + node, &[5]).unwrap());
 }

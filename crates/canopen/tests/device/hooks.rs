@@ -1,4 +1,4 @@
-//! What the device tells its application, and RPDOs whose objects have limits or rules.
+//! Calls of the application by the device, and RPDOs whose objects have limits or rules.
 
 use crate::bench::{Bench, Told};
 use canopen::nmt::State;

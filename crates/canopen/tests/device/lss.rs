@@ -215,7 +215,7 @@ fn a_configured_slave_is_neither_unconfigured_nor_scanned() {
     assert_eq!(send(&mut bench, confirm), None);
 }
 
-/// The master's side of fastscan against one slave.
+/// Runs the master's side of fastscan against one slave.
 fn scan(bench: &mut Bench) -> [u32; 4] {
     let confirm = Request::Fastscan { value: 0, bit: Request::CONFIRM, part: 0, next: 0 };
     assert_eq!(send(bench, confirm), Some(Response::Identified));

@@ -1,4 +1,4 @@
-//! The whole device, on a bench: a small dictionary, frames in and frames out.
+//! The whole device on a test bench: a small dictionary, frames in and frames out.
 
 mod application;
 mod bench;

@@ -59,7 +59,7 @@ fn only_what_exists_is_mappable_and_has_this_length_can_be_mapped() {
     assert_eq!(bench.write32(0x1A00, 1, 0x1017_0010), Err(0x0604_0041));
     assert_eq!(bench.write32(0x1A00, 1, 0x6000_0110), Err(0x0604_0041));
     assert_eq!(bench.write32(0x1A00, 1, 0x6000_0100), Err(0x0604_0041));
-    // Dummy entries are for RPDOs.
+    // Dummy entries are allowed in RPDOs only.
     assert_eq!(bench.write32(0x1A00, 1, 0x0005_0008), Err(0x0602_0000));
 }
 
@@ -106,7 +106,7 @@ fn transmission_types_and_remote_frames_must_agree() {
     assert_eq!(bench.write32(0x1800, 1, 0x4000_0185), BAD_VALUE);
 }
 
-/// A write to an object of the TPDO, with values that are often right.
+/// A write to an object of the TPDO, with values that are often valid.
 fn writes() -> impl Strategy<Value = (u16, u8, Vec<u8>)> {
     let word = |values: Vec<u32>| prop::sample::select(values).prop_map(|v| v.to_le_bytes().to_vec());
     let cob_ids = vec![INVALID, VALID, 0x186, 0x8000_0186, 0x4000_0185, 0x601, u32::MAX];
@@ -122,8 +122,8 @@ fn writes() -> impl Strategy<Value = (u16, u8, Vec<u8>)> {
 proptest! {
     #![proptest_config(repeatable())]
 
-    /// Whatever is written in whatever order: a TPDO that exists has a mapping of one to eight bytes, made of the
-    /// entries that can be read back, and an identifier that is free for PDOs.
+    /// After any writes in any order, a TPDO that exists has a mapping of one to eight bytes that agrees with the
+    /// entries read back, and an identifier that is allowed for PDOs.
     #[test]
     fn no_sequence_of_writes_makes_a_pdo_that_cannot_be(sequence in prop::collection::vec(writes(), 1..40)) {
         let mut bench = Bench::operational();

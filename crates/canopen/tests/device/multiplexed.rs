@@ -1,4 +1,4 @@
-//! Multiplexed PDOs, both ways and in both modes.
+//! Multiplexed PDOs, in both directions and in both modes.
 
 use crate::bench::{Bench, DICTIONARY, ID};
 use canopen::Duration;
@@ -11,7 +11,7 @@ const EMCY: u16 = 0x085;
 const SOURCE: u8 = 0xFE;
 const DESTINATION: u8 = 0xFF;
 
-/// Makes TPDO 1 a multiplexed one.
+/// Makes TPDO 1 a multiplexed PDO.
 fn sender(count: u8) -> Bench {
     let mut bench = Bench::booted();
     bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
@@ -22,7 +22,7 @@ fn sender(count: u8) -> Bench {
     bench
 }
 
-/// Makes RPDO 1 a multiplexed one, in Operational.
+/// Makes RPDO 1 a multiplexed PDO, in Operational.
 fn receiver(count: u8) -> Bench {
     let mut bench = Bench::operational();
     bench.write(0x1600, 0, &[count]).unwrap();
@@ -113,7 +113,7 @@ fn a_full_queue_delays_and_leaving_operational_drops() {
 #[test]
 fn one_that_is_mapped_elsewhere_is_not_sent_twice() {
     let mut bench = Bench::operational();
-    // TPDO 1 carries 6000h:1; there is no second TPDO to be multiplexed, so none is.
+    // TPDO 1 carries 6000h:1. No second TPDO is multiplexed, so nothing is sent with this CAN-ID.
     bench.set_value(2, &[1, 0]);
     assert!(bench.sent().iter().all(|(id, _)| *id != TPDO));
 }
@@ -199,7 +199,7 @@ fn a_count_between_the_slots_and_the_modes_is_too_high() {
     }
 }
 
-/// What was sent is still so when another PDO is configured.
+/// Values that were sent are not sent again when another PDO is configured.
 #[test]
 fn a_write_to_another_pdo_sends_nothing() {
     let mut bench = sender(DESTINATION);
@@ -216,7 +216,7 @@ fn a_write_to_another_pdo_sends_nothing() {
     assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 3, 1, 0, 0, 0]]);
 }
 
-/// The parts of a device that are there may change: what is told anew is sent, whatever its value.
+/// The parts of a device may change: an object that is sent to all nodes again is sent once, whatever its value.
 #[test]
 fn the_application_leaves_out_what_is_not_there() {
     let mut bench = sender(DESTINATION);

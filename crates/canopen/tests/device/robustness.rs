@@ -1,11 +1,11 @@
-//! Anything may arrive at any time.
+//! Random frames at any time.
 
 use crate::bench::{Bench, DICTIONARY, ID, repeatable};
 use canopen::nmt::State;
 use canopen::{Duration, Frame};
 use proptest::prelude::*;
 
-/// Identifiers that mean something to the node, most of the time.
+/// Identifiers, mostly those that mean something to the node.
 fn identifier() -> impl Strategy<Value = u16> {
     prop_oneof![
         4 => Just(0x600 + u16::from(ID)),
@@ -16,7 +16,7 @@ fn identifier() -> impl Strategy<Value = u16> {
     ]
 }
 
-/// SDO requests that hit an object of the dictionary, most of the time.
+/// SDO requests, mostly for an object of the dictionary.
 fn payload() -> impl Strategy<Value = Vec<u8>> {
     let entry =
         prop::sample::select(crate::bench::rows().map(|(row, _)| (row.index, row.sub)).collect::<Vec<_>>());
@@ -35,7 +35,7 @@ fn frame() -> impl Strategy<Value = Frame> {
     })
 }
 
-/// What CiA 301 lets a node send in a state. EMCY and PDO are where the dictionary has put them.
+/// Whether CiA 301 lets a node send the frame in a state. EMCY and PDOs have the CAN-IDs of the dictionary.
 fn is_allowed(state: State, frame: &Frame, bench: &Bench) -> bool {
     let emcy = DICTIONARY.field(0x1014, 0).u32(bench.device.image());
     match frame.id() {
@@ -74,7 +74,7 @@ proptest! {
         }
     }
 
-    /// The two polls together never ask to be called again at once, or the processor would spin.
+    /// The two polls together never ask to be called again at once, because the processor would spin.
     #[test]
     fn the_next_deadline_is_later_than_now(frames in prop::collection::vec(frame(), 1..60), room in 0..10_usize) {
         let mut bench = Bench::booted();

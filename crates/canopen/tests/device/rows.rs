@@ -104,7 +104,7 @@ pub(crate) const ROWS: &[Object] = &[
 
 pub(crate) const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-/// The rows and their entries, for what compares them.
+/// The rows and their entries, for comparisons.
 pub(crate) fn rows() -> impl Iterator<Item = (&'static Object, Entry)> {
     ROWS.iter().zip(DICTIONARY.entries())
 }

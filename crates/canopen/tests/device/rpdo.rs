@@ -1,4 +1,4 @@
-//! RPDOs: when data is taken, deadlines, lengths, dummy mapping.
+//! RPDOs: time of acceptance, deadlines, lengths, dummy mapping.
 
 use crate::bench::Bench;
 use canopen::{Duration, Frame};
@@ -29,7 +29,7 @@ fn value(bench: &mut Bench) -> Vec<u8> {
     bench.read(VALUE.0, VALUE.1).unwrap()
 }
 
-/// EMCY code and which PDO.
+/// EMCY code and number of the PDO.
 fn emergencies(bench: &mut Bench) -> Vec<(u16, u8)> {
     let messages = bench.sent().into_iter().filter(|(id, _)| *id == 0x085);
     messages.map(|(_, data)| (u16::from_le_bytes([data[0], data[1]]), data[3])).collect()

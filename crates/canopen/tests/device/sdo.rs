@@ -1,4 +1,4 @@
-//! The SDO server: transfers, and an abort code for everything that can be wrong.
+//! The SDO server: transfers, and an abort code for every possible error.
 
 use crate::bench::Bench;
 use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response, Segment};

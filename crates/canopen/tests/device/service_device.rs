@@ -1,4 +1,4 @@
-//! The inner device alone: NMT, SDO, heartbeat and LSS, and nothing of the other services.
+//! The service device alone: NMT, SDO, heartbeat and LSS, without the other services.
 
 use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
 use canopen::nmt::State;
@@ -14,7 +14,7 @@ const DOMAIN: Multiplexer = Multiplexer { index: 0x2000, sub: 0 };
 const VALUE: Object =
     Object::new(0x2001, 0, "", Type::Unsigned32, Access::ReadWrite).mappable(Mapping::Tpdo).value(7);
 
-/// With objects of services that the device has not.
+/// With objects of services that the device does not have.
 const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(0x0001_0191), objects::error_register(), objects::heartbeat_producer(0)],
     objects::identity(1, 2, 3),
@@ -25,7 +25,7 @@ const ROWS: &[Object] = canopen::rows!(
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-/// Keeps a domain.
+/// An application that keeps a domain.
 #[derive(Default)]
 struct Loader(Vec<u8>);
 
@@ -116,7 +116,7 @@ fn a_heartbeat_begins_when_its_time_is_written() {
     let mut bench = Bench::booted();
     assert_eq!(bench.write(0x1017, 0, &[100, 0]), Ok(()));
     let mut out = Sent::default();
-    // Actions that wait for the caller are handed over first.
+    // Actions that wait for the caller are returned first.
     while bench.device.poll(bench.now, &mut out).action.is_some() {}
     out.0.clear();
     let heartbeat = Frame::new(0x700 + u16::from(ID), &[0x7F]).unwrap();

@@ -1,4 +1,4 @@
-//! Which frames the device sends as states, of which a queue may drop all but the newest.
+//! The frames that the device sends as states, of which a queue may drop all but the newest.
 
 use canopen::lss::Request;
 use canopen::{Duration, Frame};
@@ -31,7 +31,7 @@ fn a_pdo_is_one_whatever_sends_it() {
     assert_eq!(bench.out.states, [TPDO; 3]);
 }
 
-/// The messages of one identifier are about different objects.
+/// The messages of one identifier concern different objects.
 #[test]
 fn a_multiplexed_pdo_is_none() {
     let mut bench = Bench::booted();
@@ -57,7 +57,7 @@ fn what_is_answered_or_told_once_is_none() {
     assert_eq!((ids, &bench.out.states[..]), (vec![0x085, 0x7E4], &[][..]));
 }
 
-/// The application says that the frames of the TPDO are events: the queue gets every one of them.
+/// The application declares the frames of the TPDO as events, so the queue gets every one of them.
 #[test]
 fn a_pdo_of_events_is_none() {
     let mut bench = Bench::booted();

@@ -10,7 +10,7 @@ const LOAD: [u8; 4] = *b"load";
 const RESET_COMMUNICATION: u8 = 0x82;
 const RESET_NODE: u8 = 0x81;
 
-/// Writes a signature that the node takes, and gives the job.
+/// Writes a signature that the node accepts, and returns the job.
 fn begin(bench: &mut Bench, index: u16, sub: u8, signature: [u8; 4]) -> Job {
     while bench.take_action().is_some() {}
     let [low, high] = index.to_le_bytes();
@@ -30,7 +30,7 @@ fn finish(bench: &mut Bench, result: Result<(), Abort>) -> Vec<u8> {
     sent[0].1.clone()
 }
 
-/// Does what the memory would do.
+/// Does the work of the memory.
 fn save(bench: &mut Bench) {
     let job = begin(bench, 0x1010, 1, SAVE);
     assert_eq!(job, Job::Store(Groups::ALL_PARAMETERS));
@@ -119,7 +119,7 @@ fn a_repeated_request_waits_for_the_same_job_and_another_one_is_refused() {
     assert_eq!(bench.ask_raw([0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e']), None);
     assert_eq!(bench.take_action(), None);
     assert_eq!(bench.write(0x1010, 3, &SAVE), Err(0x0800_0022));
-    // The client has gone on to something else: nobody waits for the first job any more.
+    // The client has continued with another transfer, so nobody waits for the first job.
     bench.take();
     bench.finish(Ok(()));
     assert_eq!(bench.sent(), []);
@@ -178,7 +178,7 @@ fn a_default_cob_id_follows_the_node_id_and_another_one_does_not() {
 #[test]
 fn values_of_an_older_dictionary_fit_and_new_objects_have_their_defaults() {
     let mut bench = Bench::booted();
-    // What a firmware that knew only 1017h would have stored.
+    // Data stored by a firmware that knew only 1017h.
     bench.device.application_mut().stored[0] = vec![0x17, 0x10, 0, 1, 2, 0xF4, 0x01];
     reset(&mut bench, RESET_COMMUNICATION);
     assert_eq!(bench.read(0x1017, 0), Ok(vec![0xF4, 0x01]));
@@ -194,11 +194,11 @@ fn values_that_no_longer_fit_are_refused_as_a_whole_and_reported() {
         &[0x17, 0x10, 1, 1, 2, 0, 0],             // no such sub-index
         &[0x06, 0x10, 0, 1, 2, 0, 0],             // another size
         &[0x29, 0x10, 1, 1, 1, 255],              // above its limit
-        &[0x00, 0x61, 0, 1, 2, 0, 0],             // of another group
-        &[0x00, 0x1A, 1, 1, 4, 8, 0, 0xFF, 0x67], // a mapping of what is not there
+        &[0x00, 0x61, 0, 1, 2, 0, 0],             // object of another group
+        &[0x00, 0x1A, 1, 1, 4, 8, 0, 0xFF, 0x67], // a mapping of an object that does not exist
         &[0x17, 0x10, 0],                         // cut
         &[0x17, 0x10, 0, 2, 2, 0, 0],             // cut
-        &[0x17, 0x10, 0, 0, 2],                   // a run of nothing
+        &[0x17, 0x10, 0, 0, 2],                   // an empty run
         &[0x17, 0x10, 0, 5, 0],
     ];
     for misfit in misfits {
@@ -211,7 +211,7 @@ fn values_that_no_longer_fit_are_refused_as_a_whole_and_reported() {
         assert_eq!(bench.read(0x1017, 0), Ok(1000_u16.to_le_bytes().to_vec()), "{misfit:x?}");
         assert_eq!(bench.device.application().loaded.last(), Some(&(Group::Communication, false)));
 
-        // Stored anew, the next start is a good one.
+        // After storing again, the next start is good.
         bench.device.application_mut().stored[0].clear();
         bench.nmt(RESET_COMMUNICATION);
         bench.start();

@@ -5,7 +5,7 @@ use canopen::{Duration, Frame};
 
 const TPDO: u16 = 0x185;
 
-/// An operational device with a TPDO of type `every`, whose SYNC has a counter up to 10 if `counts`.
+/// An operational device with a TPDO of type `every`; with `counts`, the SYNC has a counter up to 10.
 fn bench(every: u8, start: u8, counts: bool) -> Bench {
     let mut bench = Bench::booted();
     bench.write32(0x1800, 1, 0x8000_0185).unwrap();

@@ -6,7 +6,7 @@ use canopen::{Duration, Frame};
 const TPDO: u16 = 0x185;
 const MS: Duration = Duration::from_millis(1);
 
-/// An operational device whose TPDO has this type, inhibit time (100 us) and event timer (ms).
+/// An operational device whose TPDO has this transmission type, inhibit time (100 us) and event timer (ms).
 fn bench(transmission: u8, inhibit: u16, event: u16) -> Bench {
     let mut bench = Bench::booted();
     bench.write32(0x1800, 1, 0x8000_0185).unwrap();

@@ -1,4 +1,4 @@
-//! The client of the library at a device under test, for objects of up to 256 bytes.
+//! The client of the library, connected to a device under test, for objects of up to 256 bytes.
 
 use canopen::client::sdo::{Buffer, Download, Error, Options, Upload};
 use canopen::client::{Service, Step};
@@ -6,7 +6,7 @@ use canopen::sdo::{BlockSize, Multiplexer};
 use canopen::{Duration, Frame, Instant, NodeId};
 
 const MEMORY: usize = 256;
-/// Every request is sent once.
+/// Options for sending every request once.
 const ONCE: Options = Options {
     timeout: Duration::from_millis(100),
     limit: Duration::from_millis(1000),
@@ -14,8 +14,8 @@ const ONCE: Options = Options {
     block_size: BlockSize::MAX,
 };
 
-/// Reads a value by whatever transfer the server chooses; the abort code where the device refuses. `ask` hands a request to
-/// the device and gives what the device sends at once.
+/// Reads a value by any transfer that the server chooses; the abort code if the device refuses. `ask` gives a request
+/// to the device and returns the frames that the device sends at once.
 pub(crate) fn read(node: u8, at: Multiplexer, ask: impl FnMut(Frame) -> Vec<Frame>) -> Result<Vec<u8>, u32> {
     let mut memory = [0; MEMORY];
     let mut upload = Upload::new(NodeId::new(node).unwrap(), at, Buffer::new(&mut memory), ONCE);
@@ -23,7 +23,7 @@ pub(crate) fn read(node: u8, at: Multiplexer, ask: impl FnMut(Frame) -> Vec<Fram
     Ok(upload.into_sink().as_slice().to_vec())
 }
 
-/// Writes a value, expedited where it has up to four bytes.
+/// Writes a value, expedited if it has up to four bytes.
 pub(crate) fn write(
     node: u8,
     at: Multiplexer,

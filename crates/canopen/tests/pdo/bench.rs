@@ -1,4 +1,4 @@
-//! A device without an application, and a queue that keeps what it is given.
+//! A device without an application, and a queue that keeps all frames.
 
 use canopen::sdo::Multiplexer;
 use canopen::{Application, Device, Frame, Instant, QueueFull, Transmit};
@@ -12,7 +12,7 @@ pub(crate) struct Nothing;
 
 impl Application for Nothing {}
 
-/// Everything that was sent.
+/// All frames sent.
 #[derive(Default)]
 pub(crate) struct Sent(pub(crate) Vec<Frame>);
 
@@ -27,7 +27,7 @@ impl Transmit for Sent {
     }
 }
 
-/// Writes a value by SDO; the abort code where the device refuses.
+/// Writes a value by SDO; the abort code if the device refuses.
 pub(crate) fn download<
     A: Application,
     const N: usize,

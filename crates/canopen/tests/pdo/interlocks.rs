@@ -1,5 +1,5 @@
-//! The interlocks of the PDO objects: whatever is written to them in whatever order, no PDO exists that cannot be, and
-//! none changes while it exists (CiA 301, 7.5.2.35 to 38).
+//! The interlocks of the PDO objects: after any writes in any order, no impossible PDO exists, and no PDO changes while
+//! it exists (CiA 301, 7.5.2.35 to 38).
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
 use canopen::pdo::MappedObject;
@@ -103,7 +103,7 @@ fn number(device: &Node, index: u16, sub: u8) -> u32 {
     bytes(device, index, sub).iter().rev().fold(0, |n, &byte| n << 8 | u32::from(byte))
 }
 
-/// What the objects of a PDO say.
+/// The content of a PDO's objects.
 #[derive(Clone, Debug, PartialEq)]
 struct Pdo {
     cob_id: u32,
@@ -112,7 +112,7 @@ struct Pdo {
 }
 
 impl Pdo {
-    /// `index` is one of its objects.
+    /// The PDO that the object `index` belongs to.
     fn read(device: &Node, index: u16) -> Pdo {
         let (communication, mapping) = (index & !0x0200, index | 0x0200);
         let count = u8::try_from(number(device, mapping, 0)).unwrap();
@@ -137,7 +137,7 @@ impl Pdo {
     }
 }
 
-/// By the rows of the table, and the dummy entries of CiA 301, table 71.
+/// Whether the entry can be mapped: by the rows of the table, and the dummy entries of CiA 301, table 71.
 fn is_mappable(entry: u32, is_transmit: bool) -> bool {
     let MappedObject { index, sub, bits } = MappedObject::parse(entry);
     let dummy = matches!((index, bits), (2 | 5, 8) | (3 | 6, 16) | (4 | 7, 32)) && sub == 0;
@@ -155,7 +155,7 @@ struct Write {
     bytes: Vec<u8>,
 }
 
-/// A write to an object of one of a few PDOs, with values that are often right: else no PDO would ever be.
+/// A write to an object of one of a few PDOs, with values that are often valid; otherwise no PDO would ever exist.
 fn writes(pdos: Vec<u16>) -> impl Strategy<Value = Write> {
     let word = |values: Vec<u32>| prop::sample::select(values).prop_map(|v| v.to_le_bytes().to_vec());
     let cob_ids = vec![0x185, 0x4000_0186, 0x8000_0185, 0x8000_0186, 0xC000_0000, 0x601, 0x2000_0185, 0x7FF];
@@ -192,7 +192,7 @@ fn writes(pdos: Vec<u16>) -> impl Strategy<Value = Write> {
     })
 }
 
-/// The five steps that make a PDO.
+/// The five steps that create a PDO.
 fn procedure(pdo: u16) -> Vec<Write> {
     let entry: u32 = if pdo & 0x0800 != 0 { 0x2003_0020 } else { 0x2006_0020 };
     let word = |value: u32| value.to_le_bytes().to_vec();
@@ -207,7 +207,7 @@ fn procedure(pdo: u16) -> Vec<Write> {
     .into()
 }
 
-/// Two PDOs, of any direction and number, and writes to them.
+/// Two PDOs of any direction and number, and writes to them.
 fn sequences() -> impl Strategy<Value = (bool, Vec<Write>)> {
     let pdo = (prop::sample::select(vec![0x1400, 0x1800]), 0..PDOS).prop_map(|(base, number)| base | number);
     let writes = prop::collection::vec(pdo, 2).prop_flat_map(|pdos| {
@@ -218,7 +218,7 @@ fn sequences() -> impl Strategy<Value = (bool, Vec<Write>)> {
     (any::<bool>(), writes.prop_map(|parts| parts.concat()))
 }
 
-/// Steps that left a PDO valid, and attempts to change such a one.
+/// Number of steps that left a PDO valid, and of attempts to change a valid PDO.
 #[derive(Default)]
 struct Seen {
     valid: usize,
@@ -231,7 +231,7 @@ fn step(device: &mut Node, next: &Write, seen: &mut Seen) -> Result<(), TestCase
     let after = Pdo::read(device, next.index);
     if is_taken {
         prop_assert_eq!(bytes(device, next.index, next.sub), next.bytes.clone());
-        // Nothing but this object has changed.
+        // Only this object has changed.
         let field = DICTIONARY.find(next.index, next.sub).unwrap().field();
         let mut expected = image;
         field.set(&mut expected, &next.bytes);
@@ -251,7 +251,7 @@ fn step(device: &mut Node, next: &Write, seen: &mut Seen) -> Result<(), TestCase
     Ok(())
 }
 
-/// The device listens to the RPDOs that exist and to remote frames for the TPDOs that allow them, and to no other.
+/// The device listens only to the RPDOs that exist, and to remote frames for the TPDOs that allow them.
 fn listens_to_what_exists(device: &Node) -> Result<(), TestCaseError> {
     let pdos = |base: u16| (base..base + PDOS).map(|index| Pdo::read(device, index)).filter(Pdo::is_valid);
     let asked = pdos(0x1800).filter(|pdo| pdo.cob_id >> 30 == 0);

@@ -1,4 +1,4 @@
-//! PDOs of dictionaries made for the purpose.
+//! PDOs of dictionaries made for these tests.
 
 mod bench;
 #[allow(dead_code)] // These tests only write.

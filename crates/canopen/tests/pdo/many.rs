@@ -1,4 +1,4 @@
-//! As many PDOs and heartbeats as CiA 301 allows: 512 each way, and 127.
+//! As many PDOs and heartbeats as CiA 301 allows: 512 in each direction, and 127.
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Tables, Type};
 use canopen::{Device, Duration, Fault, Frame, Instant, NodeId};
@@ -13,7 +13,7 @@ const NOW: Instant = Instant(1_000_000);
 
 type Node = Device<Recorder, 65_000, 512, 512, 127, 0>;
 
-/// What the application was told.
+/// Records the calls of the application.
 #[derive(Default)]
 struct Recorder {
     received: Vec<u16>,

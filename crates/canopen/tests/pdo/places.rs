@@ -1,4 +1,4 @@
-//! PDOs at numbers of the dictionary's choice, and PDOs to which a profile has given their CAN-IDs.
+//! PDOs with numbers chosen by the dictionary, and PDOs with CAN-IDs fixed by a profile.
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
 use canopen::{Device, Frame, Instant, NodeId};
@@ -15,7 +15,7 @@ const fn cob_id(index: u16, default: DefaultValue) -> [Object; 3] {
     ]
 }
 
-/// One whose CAN-ID is fixed.
+/// A COB-ID with a fixed CAN-ID.
 const fn predefined(index: u16, default: DefaultValue) -> [Object; 3] {
     let [highest, cob_id, transmission] = cob_id(index, default);
     [highest, cob_id.predefined(), transmission]
@@ -33,7 +33,7 @@ const fn value(index: u16, access: Access, mapping: Mapping) -> Object {
     Object::new(index, 0, "", Type::Unsigned16, access).mappable(mapping)
 }
 
-/// RPDOs 7 and 512, TPDOs 2 (multiplexed), 130, 261 and 512, all but the last with a CAN-ID of their own.
+/// RPDOs 7 and 512, TPDOs 2 (multiplexed), 130, 261 and 512. All but the last have a fixed CAN-ID.
 const PARTS: &[&[Object]] = &[
     &predefined(0x1406, DefaultValue::Integer(0x206)),
     &predefined(0x15FF, DefaultValue::Integer(0x180)),
@@ -83,7 +83,7 @@ impl Bench {
         self.sent.0.drain(..).map(|frame| frame.id()).collect()
     }
 
-    /// Changes one of the values and gives what is sent.
+    /// Changes one of the values and returns the CAN-IDs sent.
     fn change(&mut self, index: u16) -> Vec<u16> {
         self.ids();
         let field = DICTIONARY.field(index, 0);
@@ -148,11 +148,11 @@ fn a_pre_defined_pdo_changes_its_flags_and_nothing_else() {
         (0x1904, 0x8000_0180, Ok(())),
         (0x1904, 0x8000_0181, Err(INVALID_VALUE)),
         (0x1904, 0x0000_0180, Ok(())),
-        // Its default counts from the node-ID.
+        // The default of this COB-ID includes the node-ID.
         (0x1881, 0xC000_0480, Err(INVALID_VALUE)),
         (0x1881, 0xC000_0485, Ok(())),
         (0x1881, 0x0000_0485, Ok(())),
-        // The others may not have what CiA 301 restricts.
+        // Other PDOs must not use the CAN-IDs that CiA 301 restricts.
         (0x19FF, 0x0000_0180, Err(INVALID_VALUE)),
         (0x19FF, 0x0000_0181, Ok(())),
     ] {

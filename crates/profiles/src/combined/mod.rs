@@ -1,7 +1,8 @@
-//! Encoder and pressure transmitter in one node: a module of two devices (CiA 301, 7.5.2.1). The encoder is the first and
-//! has the indexes of its profile; the transmitter is the second and has them 800h higher.
+//! Encoder and pressure transmitter in one node: a module of two devices (CiA 301, 7.5.2.1). The encoder is the first
+//! device and keeps the indexes of its profile; the transmitter is the second device, with 800h added to its indexes.
 //!
-//! A table and no code: the rows of both, and the pair of both profiles.
+//! This module has no code of its own for the profiles: it combines the rows of both and makes a [`Pair`] of both
+//! profiles.
 
 mod pdos;
 mod shift;
@@ -13,13 +14,13 @@ use crate::fault::Fault;
 use crate::pair::Pair;
 use crate::{encoder, pressure};
 
-/// From the indexes of a device profile to those of the second device.
+/// Added to the indexes of a device profile for the second device.
 const SHIFT: u16 = 0x800;
 
-/// The profile of the first device; the high word says that there are several.
+/// The profile of the first device; the high word means several devices.
 const DEVICE_TYPE: i64 = 0xFFFF_0196;
 
-/// The device type of one of the devices.
+/// The device type of one of the two devices.
 const fn device_type(index: u16, name: &'static str, code: i64) -> Object {
     Object::new(index, 0, name, Type::Unsigned32, Access::ReadOnly).value(code)
 }
@@ -34,7 +35,7 @@ const PRESSURE_TYPE: Object = device_type(0x6FFF, "Device type 2", pressure::obj
 static REAL: [Object; pressure::objects::REAL.len()] = shift::shifted(pressure::objects::REAL);
 static INTEGER: [Object; pressure::objects::INTEGER.len()] = shift::shifted(pressure::objects::INTEGER);
 
-/// The rows of both, but for those that all devices have.
+/// The rows of both devices, without the rows that all devices have.
 pub const ROWS: &[&[Object]] = &[
     &[communication::device_type(DEVICE_TYPE)],
     pressure::objects::STATUS_REGISTER,
@@ -53,13 +54,13 @@ pub const ROWS: &[&[Object]] = &[
     &INTEGER,
 ];
 
-/// Both profiles have faults of their own; there are no others.
+/// None: both profiles list their own faults.
 pub const FAULTS: &[Fault] = &[];
 
 /// Whether one of the profiles decides on a write to this object.
 ///
 /// # Panics
-/// During compilation, when both do.
+/// During compilation, if both do.
 #[must_use]
 pub const fn handles(index: u16, sub: u8) -> bool {
     let first = encoder::objects::handles(index, sub);
@@ -71,7 +72,7 @@ pub const fn handles(index: u16, sub: u8) -> bool {
 /// Both profiles.
 pub type Objects = Pair<encoder::objects::Objects, pressure::objects::Objects>;
 
-/// Where the values of both are in the image.
+/// The places of both devices' values in the image.
 #[must_use]
 pub const fn fields(dictionary: &Dictionary) -> (encoder::objects::Fields, pressure::objects::Fields) {
     (

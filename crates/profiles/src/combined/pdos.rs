@@ -1,5 +1,5 @@
-//! Each device sends its values twice, as encoders do: by event, and with every SYNC. The master uses what it needs; the
-//! COB-IDs are the four TPDOs of the pre-defined connection set (CiA 301, 7.3.5).
+//! Each device sends its values twice, as encoders do: by event, and with every SYNC. A master uses the PDOs that it
+//! needs. The COB-IDs are the four TPDOs of the pre-defined connection set (CiA 301, 7.3.5).
 
 use crate::communication::Tpdo;
 use crate::encoder::objects::{BY_EVENT, BY_SYNC};
@@ -8,7 +8,7 @@ use canopen::dictionary::DefaultValue;
 /// Pressure and temperature.
 const PROCESS_VALUES: &[i64] = &[0x6930_0120, 0x6930_0220];
 
-/// As TPDO 1 of the transmitter alone.
+/// As TPDO 1 of a stand-alone transmitter.
 const PRESSURE_BY_EVENT: Tpdo = Tpdo {
     number: 2,
     cob_id: DefaultValue::NodeId(0x380),

@@ -1,4 +1,4 @@
-//! The rows of the second device, made from those of the device alone.
+//! The rows of the second device, made from the rows of the stand-alone device.
 
 use super::SHIFT;
 use canopen::dictionary::Object;
@@ -14,7 +14,7 @@ pub(super) const fn shifted<const N: usize>(rows: &[Object]) -> [Object; N] {
     out
 }
 
-/// A unit that is an index is that of the object which selects it.
+/// One shifted row. A unit that names an index is shifted too.
 const fn row(row: &Object) -> Object {
     let unit = if matches!(row.unit.as_bytes(), b"6131h") { "6931h" } else { row.unit };
     Object { index: row.index + SHIFT, unit, ..*row }

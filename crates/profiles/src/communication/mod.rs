@@ -1,5 +1,5 @@
-//! What every device of the project has, 1000h to 2FFFh, and the parts of the communication segment in which devices
-//! differ, as functions.
+//! Objects of every device of the project, 1000h to 2FFFh, and functions for the parts of the communication segment in
+//! which devices differ.
 
 mod node;
 mod objects;

@@ -2,11 +2,11 @@
 
 use canopen::dictionary::{Access, Group, Object, Type};
 
-/// Index of the object that says which personality the node has after the next reset.
+/// Index of the object that selects the personality after the next reset.
 pub const PERSONALITY: u16 = 0x2000;
 
-/// 2000h, in a node with so many personalities. Stored at once, with node-ID and bit rate: no 1010h is needed. The
-/// parameters that are stored belong to the personality that stored them.
+/// 2000h, in a node with `count` personalities. Stored at once, together with node-ID and bit rate, without a write to
+/// 1010h. Stored parameters belong to the personality that stored them.
 #[allow(clippy::cast_possible_wrap)] // There are only a few.
 #[must_use]
 pub const fn personality(own: u8, count: usize) -> Object {
@@ -23,7 +23,7 @@ pub const TRANSFER_BUFFER: Object =
 /// Index of the object about the trial of a new program.
 pub const PROGRAM_TRIAL: u16 = 0x2002;
 
-/// Whether the node handles what is written there.
+/// Whether the node, and not a profile, decides on a write to this object.
 #[must_use]
 pub const fn handles(index: u16, sub: u8) -> bool {
     matches!((index, sub), (PROGRAM_TRIAL, 2) | (PROGRAM_AUTHORISATION, 3))
@@ -35,8 +35,8 @@ const fn seconds(sub: u8, name: &'static str, default: i64) -> Object {
         .stored(Group::Application)
 }
 
-/// 2002h: how the trial of a new program stands, the commands that end it, and its times in seconds (0: none). docs/update.md says how
-/// they work together.
+/// 2002h: state of the trial of a new program, the commands that end the trial, and the times in seconds (0: none).
+/// docs/update.md describes how they work together.
 pub const PROGRAM_TRIAL_ROWS: &[Object] = &[
     Object::highest(PROGRAM_TRIAL, 4, "Program trial"),
     Object::new(PROGRAM_TRIAL, 1, "State", Type::Unsigned8, Access::ReadOnly),
@@ -45,11 +45,11 @@ pub const PROGRAM_TRIAL_ROWS: &[Object] = &[
     seconds(4, "Time of the automatic confirmation", 0),
 ];
 
-/// Index of the object about who may change the program.
+/// Index of the object that controls who may change the program.
 pub const PROGRAM_AUTHORISATION: u16 = 0x2003;
 
-/// 2003h: whether the program may be changed, the challenge of this start, and the place of the response. docs/update.md says how the
-/// response is computed.
+/// 2003h: whether the program may be changed, the challenge of this start, and the response. docs/update.md describes
+/// how the response is computed.
 pub const PROGRAM_AUTHORISATION_ROWS: &[Object] = &[
     Object::highest(PROGRAM_AUTHORISATION, 3, "Program authorisation"),
     Object::new(PROGRAM_AUTHORISATION, 1, "State", Type::Unsigned8, Access::ReadOnly),
@@ -60,14 +60,15 @@ pub const PROGRAM_AUTHORISATION_ROWS: &[Object] = &[
 /// Index of the object that counts lost events.
 pub const LOST_EVENTS: u16 = 0x2001;
 
-/// How many kinds of lost events there are: sub-indexes 1 to this one.
+/// Number of kinds of lost events: sub-indexes 1 to this one.
 pub const LOST_EVENT_KINDS: u8 = 8;
 
 const fn count(sub: u8, name: &'static str) -> Object {
     Object::new(LOST_EVENTS, sub, name, Type::Unsigned32, Access::ReadOnly)
 }
 
-/// 2001h: events of the hardware that were lost and made good, counted since the start. A healthy board shows zeros.
+/// 2001h: events of the hardware that were lost and recovered from, counted since the start. A healthy board shows
+/// zeros.
 pub const LOST_EVENT_ROWS: &[Object] = &[
     Object::highest(LOST_EVENTS, LOST_EVENT_KINDS, "Lost events"),
     count(1, "Received frames"),

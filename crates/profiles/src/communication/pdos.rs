@@ -1,11 +1,11 @@
-//! PDO objects: eight PDOs each way. RPDOs wait for a use in every personality; what a TPDO is by default is a matter of
-//! the personality.
+//! PDO objects: eight PDOs in each direction. RPDOs are off by default in every personality; the defaults of the TPDOs
+//! depend on the personality.
 
 use canopen::dictionary::{self, Access, DefaultValue, Group, Object, Type};
 
-/// What a TPDO is by default.
+/// Defaults of a TPDO.
 pub struct Tpdo {
-    /// Which one it is, from 0.
+    /// Number of the TPDO, from 0.
     pub number: u16,
     /// COB-ID.
     pub cob_id: DefaultValue,
@@ -13,19 +13,19 @@ pub struct Tpdo {
     pub transmission: i64,
     /// Event timer in ms.
     pub event_timer: i64,
-    /// What is mapped.
+    /// Mapped objects.
     pub mapped: &'static [i64],
 }
 
 impl Tpdo {
-    /// One that waits for a use, by its number from 0.
+    /// A TPDO that is off by default. `number` counts from 0.
     #[must_use]
     pub const fn spare(number: u16) -> Tpdo {
         Tpdo { number, cob_id: off(0x180, number), transmission: 255, event_timer: 0, mapped: &[] }
     }
 }
 
-/// The default COB-ID of a PDO that is switched off: the first four have a place in the pre-defined connection set.
+/// The default COB-ID of a PDO that is off. The first four PDOs have a CAN-ID in the pre-defined connection set.
 #[must_use]
 pub const fn off(base: u32, number: u16) -> DefaultValue {
     match number {
@@ -68,8 +68,8 @@ pub const fn sync_start(index: u16) -> Object {
     parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
 }
 
-/// The number of mapped objects. No limit in the table: 254 and 255 make it a multiplexed PDO, and the rule knows how
-/// many slots there are.
+/// Number of mapped objects. The table has no limit, because 254 and 255 make a multiplexed PDO; the rule of the object
+/// checks the number of slots.
 #[must_use]
 pub const fn count(index: u16, name: &'static str, used: i64) -> Object {
     parameter(index, 0, name, Type::Unsigned8).value(used)
@@ -158,7 +158,7 @@ const RPDO_PARTS: &[&[Object]] = &[rpdos().as_flattened(), rpdo_mappings().as_fl
 /// 1400h to 1607h: eight RPDOs.
 pub static RPDOS: [Object; dictionary::count(RPDO_PARTS)] = dictionary::gather(RPDO_PARTS);
 
-/// The communication parameters of these TPDOs.
+/// Communication parameters of these TPDOs.
 #[must_use]
 pub const fn tpdos<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 6]; N] {
     let mut rows = [tpdo(0x1800, &defaults[0], ""); N];
@@ -171,7 +171,7 @@ pub const fn tpdos<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 6]; N] {
     rows
 }
 
-/// Their mapping parameters.
+/// Mapping parameters of these TPDOs.
 #[must_use]
 pub const fn tpdo_mappings<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 9]; N] {
     let mut rows = [mapping(0x1A00, &[], ""); N];

@@ -1,4 +1,4 @@
-//! What comes after the PDOs: programs, start-up, multiplexed PDOs (CiA 301, CiA 302-2, CiA 302-3).
+//! Objects after the PDOs: programs, start-up, multiplexed PDOs (CiA 301, CiA 302-2, CiA 302-3).
 
 use canopen::dictionary::{Access, Group, Object, Type};
 

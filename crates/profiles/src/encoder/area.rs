@@ -16,10 +16,10 @@ pub struct Area {
     pub high: i32,
 }
 
-/// What the manufacturer says about the sensor (650Ah), in its own steps.
+/// Manufacturer's data of the sensor (650Ah), in the steps of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Module {
-    /// From the sensor's own zero to that of the encoder (650Ah:1).
+    /// Distance from the zero of the sensor to the zero of the encoder (650Ah:1).
     pub offset: i32,
     /// Lowest position (650Ah:2).
     pub low: i32,
@@ -36,9 +36,9 @@ impl Default for Module {
 
 /// The area state register at a position value and a position in native steps.
 ///
-/// The limits of the work area belong to it: lower and higher positions are reported (CiA 406, 7.4.1). A limit of the
-/// manufacturer is reported when it is reached. The limits are signed and 6004h is not: both are compared in 64 bits. The
-/// ends of INTEGER32 are no limits to the sensor.
+/// The limits of the work area are part of the work area: only positions beyond a limit are reported (CiA 406, 7.4.1).
+/// A limit of the manufacturer is reported as soon as the position reaches it. The limits are signed and 6004h is not,
+/// so both are compared in 64 bits. A limit at either end of INTEGER32 counts as no limit.
 #[must_use]
 pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u8 {
     let position = i64::from(position);

@@ -2,8 +2,8 @@
 
 /// One cam of one channel.
 ///
-/// Active from the low to the high limit, both included; once active until the position is further outside than the
-/// hysteresis. Limits in the wrong order are taken in the right one (CiA 406 is silent).
+/// A cam goes on from the low to the high limit, both included. It stays on until the position is further outside than
+/// the hysteresis. Limits in the wrong order are swapped (CiA 406 is silent about them).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cam {
     /// Low limit (6310h to 6317h).
@@ -14,10 +14,10 @@ pub struct Cam {
     pub hysteresis: u16,
 }
 
-/// The cams of one channel, which of them work, and how they show.
+/// The cams of one channel with their enable and polarity bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cams {
-    /// In the order of their bits.
+    /// The cams, in the order of their bits.
     pub cams: [Cam; 8],
     /// Cam enable (6301h): bit n - 1 for cam n.
     pub enable: u8,
@@ -29,13 +29,13 @@ pub struct Cams {
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
     low: u32,
-    /// The highest position less the lowest.
+    /// Highest position minus lowest position.
     length: u32,
 }
 
 impl Window {
-    /// The interval with this margin on both sides. The limits are signed and the position is not: what lies below
-    /// zero no position reaches; `None` when that is all.
+    /// The interval of the cam, with `margin` added on both sides. The limits are signed and the position is not, so
+    /// the part below zero is cut off. `None` when nothing remains.
     fn new(cam: &Cam, margin: u16) -> Option<Window> {
         let low = i64::from(cam.low.min(cam.high)) - i64::from(margin);
         let high = i64::from(cam.low.max(cam.high)) + i64::from(margin);
@@ -48,14 +48,14 @@ impl Window {
     }
 }
 
-/// The cams of one channel, ready to be looked up, with what hysteresis must remember.
+/// The cams of one channel as position windows, with the state that hysteresis needs.
 #[derive(Clone, Debug, Default)]
 pub struct CamChannel {
     enable: u8,
     polarity: u8,
-    /// Those whose limits some position can reach.
+    /// Bits of the cams whose limits some position can reach.
     reachable: u8,
-    /// Where a cam goes on, and where it stays on.
+    /// For each cam: the window in which the cam goes on, and the window in which the cam stays on.
     windows: [[Window; 2]; 8],
     active: u8,
 }
@@ -71,9 +71,9 @@ impl CamChannel {
         }
     }
 
-    /// The cam state register (6300h) at `position`. A cam that is not enabled reads 0 whatever its polarity: 6301h says
-    /// that its calculation is off and its state permanently 0. It forgets its state, so after enabling its limits alone
-    /// decide.
+    /// The cam state register (6300h) at `position`. A disabled cam reads 0 whatever its polarity: 6301h says that its
+    /// calculation is off and its state permanently 0. A disabled cam also forgets its state, so after enabling, the
+    /// limits alone decide.
     pub fn update(&mut self, position: u32) -> u8 {
         let mut active = 0;
         for ([on, stay], bit) in self.windows.iter().zip(BITS) {
@@ -99,7 +99,7 @@ mod tests {
         channel
     }
 
-    /// Limits near both ends of what a position and a limit can be, and near each other.
+    /// Limits near both ends of the ranges of positions and limits, and near each other.
     fn any_limit() -> impl Strategy<Value = i32> {
         prop_oneof![-50..150_i32, Just(i32::MIN), Just(i32::MAX), i32::MAX - 50..i32::MAX, any::<i32>()]
     }
@@ -117,7 +117,7 @@ mod tests {
         }
     }
 
-    /// The rule again, by walking: a cam goes on inside its window and goes off beyond the margin.
+    /// The same rule, step by step: a cam goes on inside its window and goes off beyond the margin.
     fn walk(cam: Cam, positions: &[u32]) -> Vec<bool> {
         let (low, high) = (i64::from(cam.low.min(cam.high)), i64::from(cam.low.max(cam.high)));
         let margin = i64::from(cam.hysteresis);

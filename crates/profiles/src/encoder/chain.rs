@@ -1,21 +1,21 @@
-//! The encoder: two channels and what is common to them.
+//! The encoder: two channels and their common state.
 
 use super::channel::{Channel, Pending};
 use super::supervision::{Conditions, Supervision, supported_warnings};
-use super::{ChannelParameters, ChannelValues, Kept, KeptChannel, Limits, Parameters, Start};
+use super::{ChannelParameters, ChannelValues, Limits, Parameters, RetainedChannel, RetainedState, Start};
 use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 
-/// What the encoder gives for one sample.
+/// Output of the encoder for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Sub-indexes 1 and 2 of the objects with channels; the first is also that of the objects without.
+    /// Values of channels 1 and 2 (sub-indexes 1 and 2). Objects without channels show channel 1.
     pub channels: [ChannelValues; 2],
     /// Operating status (6500h).
     pub operating_status: u16,
     /// Resolution of the first sensor (6501h).
     pub resolution: u32,
-    /// Revolutions that the first sensor tells apart (6502h).
+    /// Revolutions that the first sensor distinguishes (6502h).
     pub revolutions: u16,
     /// Alarms (6503h).
     pub alarms: u16,
@@ -25,22 +25,22 @@ pub struct Snapshot {
     pub supported_warnings: u16,
     /// Operating time (6508h) in 0.1 h.
     pub operating_time: u32,
-    /// What is reported as an emergency.
+    /// The faults to be reported as emergencies.
     pub conditions: Conditions,
 }
 
-/// The whole chain with its state.
+/// The whole measuring chain with its state.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     channels: [Option<Channel>; 2],
-    /// The operating time, and what the channels have not taken back yet.
-    kept: Kept,
-    /// Nobody has said yet which sensors there are.
+    /// The operating time, and the retained positions that no channel has taken over yet.
+    retained: RetainedState,
+    /// No parameters have been applied yet, so the sensors are not known.
     is_new: bool,
     supervision: Supervision,
     limits: Limits,
     acknowledge: Pending,
-    /// What depends on parameters alone.
+    /// The part of the snapshot that depends on parameters alone.
     fixed: Snapshot,
 }
 
@@ -51,13 +51,13 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// An encoder after power-on. It gives no position until parameters are applied: the first ones say which sensor it
-    /// was that left its position.
+    /// An encoder after power-on. There is no position until parameters are applied: the first parameters tell whether
+    /// the retained positions belong to these sensors.
     #[must_use]
     pub fn new(start: Start) -> Encoder {
         Encoder {
             channels: [None, None],
-            kept: start.kept(),
+            retained: start.retained_state(),
             is_new: true,
             supervision: Supervision::new(matches!(start, Start::Damaged(_))),
             limits: Limits::default(),
@@ -66,7 +66,7 @@ impl Encoder {
         }
     }
 
-    /// Processes what was read in one millisecond.
+    /// Processes the readings of one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
         let mut snapshot = Snapshot::default();
         self.measure(raw, &mut snapshot);
@@ -74,7 +74,7 @@ impl Encoder {
     }
 
     fn measure(&mut self, raw: &RawEncoder, snapshot: &mut Snapshot) {
-        self.kept.operating_time.tick();
+        self.retained.operating_time.tick();
         if let Some(mask) = self.acknowledge.take() {
             let [low, high, ..] = mask.to_le_bytes();
             self.supervision.acknowledge(u16::from_le_bytes([low, high]));
@@ -85,7 +85,7 @@ impl Encoder {
                 *values = channel.sample(raw);
             }
         }
-        let (channels, limits, time) = (&snapshot.channels, &self.limits, self.kept.operating_time);
+        let (channels, limits, time) = (&snapshot.channels, &self.limits, self.retained.operating_time);
         snapshot.alarms = self.supervision.alarms(channels);
         snapshot.warnings = self.supervision.warnings(channels, &raw.board, limits, time);
         snapshot.supported_warnings = supported_warnings(&raw.board);
@@ -93,29 +93,29 @@ impl Encoder {
         snapshot.operating_time = time.tenths();
     }
 
-    /// The stored form of what is to outlive a loss of power, in its place.
+    /// Writes the retained state to `words`, in its stored form.
     pub(crate) fn retain_in(&self, words: &mut [u32; RETAINED_WORDS]) {
-        let (places, rest) = words.as_chunks_mut::<{ KeptChannel::WORDS }>();
-        for ((place, channel), before) in places.iter_mut().zip(&self.channels).zip(&self.kept.channels) {
+        let (places, rest) = words.as_chunks_mut::<{ RetainedChannel::WORDS }>();
+        for ((place, channel), before) in places.iter_mut().zip(&self.channels).zip(&self.retained.channels) {
             match channel {
                 Some(channel) => channel.retain(place),
                 None => *place = before.to_words(),
             }
         }
-        rest.iter_mut().zip(self.kept.operating_time.to_words()).for_each(|(to, from)| *to = from);
+        rest.iter_mut().zip(self.retained.operating_time.to_words()).for_each(|(to, from)| *to = from);
     }
 
-    /// What is to outlive a loss of power: see [`Kept`].
+    /// The state to be retained through a loss of power: see [`RetainedState`].
     #[must_use]
     #[inline(never)]
-    pub fn kept(&self) -> Kept {
-        let ([first, second], [before, before_too]) = (&self.channels, &self.kept.channels);
-        let kept = |channel: &Option<Channel>, before: &KeptChannel| match channel {
-            Some(channel) => channel.kept(),
+    pub fn retained_state(&self) -> RetainedState {
+        let ([first, second], [before, before_too]) = (&self.channels, &self.retained.channels);
+        let retained = |channel: &Option<Channel>, before: &RetainedChannel| match channel {
+            Some(channel) => channel.retained(),
             None => *before,
         };
-        let channels = [kept(first, before), kept(second, before_too)];
-        Kept { channels, operating_time: self.kept.operating_time }
+        let channels = [retained(first, before), retained(second, before_too)];
+        RetainedState { channels, operating_time: self.retained.operating_time }
     }
 }
 
@@ -128,11 +128,12 @@ impl Chain for Encoder {
     }
 
     fn apply(&mut self, parameters: &Parameters) {
-        // What was kept and stored is for the first parameters: a channel that is switched off and on again starts afresh.
-        let kept = core::mem::take(&mut self.kept.channels);
+        // Retained positions are for the first parameters only: a channel that is switched off and on again starts
+        // afresh.
+        let retained = core::mem::take(&mut self.retained.channels);
         let is_new = core::mem::take(&mut self.is_new);
-        for ((channel, own), kept) in self.channels.iter_mut().zip(&parameters.channels).zip(&kept) {
-            apply(channel, parameters, own, kept, if is_new { own.offset } else { 0 });
+        for ((channel, own), retained) in self.channels.iter_mut().zip(&parameters.channels).zip(&retained) {
+            apply(channel, parameters, own, retained, if is_new { own.offset } else { 0 });
         }
         self.acknowledge.set(parameters.acknowledge);
         self.limits = parameters.limits;
@@ -157,12 +158,12 @@ fn apply(
     channel: &mut Option<Channel>,
     all: &Parameters,
     own: &ChannelParameters,
-    kept: &KeptChannel,
+    retained: &RetainedChannel,
     offset: i32,
 ) {
     match (all.sensor(own), channel) {
         (Some(sensor), Some(channel)) if channel.is_of(&sensor) => channel.apply(all, own, sensor),
-        (Some(sensor), channel) => *channel = Some(Channel::new(all, own, sensor, kept, offset)),
+        (Some(sensor), channel) => *channel = Some(Channel::new(all, own, sensor, retained, offset)),
         (None, channel) => *channel = None,
     }
 }

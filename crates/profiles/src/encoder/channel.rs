@@ -2,16 +2,16 @@
 
 use super::area::area_state;
 use super::commissioning::Commissioning;
-use super::input::{Input, Left};
+use super::input::{Input, LastPosition};
 use super::reference::Trust;
 use super::speed::speed_value;
 use super::{
-    Area, CamChannel, ChannelParameters, Command, KeptChannel, Module, Parameters, Position, Progress, Scale,
-    Sensor, Speedometer,
+    Area, CamChannel, ChannelParameters, Command, Module, Parameters, Position, Progress, RetainedChannel,
+    Scale, Sensor, Speedometer,
 };
 use crate::board::RawEncoder;
 
-/// What a channel gives for one sample.
+/// Output of a channel for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChannelValues {
     /// Position value (6004h, 6020h).
@@ -24,18 +24,18 @@ pub struct ChannelValues {
     pub area: u8,
     /// Offset value (6509h, 650Ch).
     pub offset: i32,
-    /// What is known about the sensor: bits `SENSOR_..`.
+    /// State of the sensor: bits `SENSOR_..`.
     pub sensor_state: u8,
-    /// How far the commissioning diagnostic is.
+    /// Progress of the commissioning diagnostic.
     pub commissioning: Progress,
-    /// [`Command::count`] of the last preset that this position knows of.
+    /// [`Command::count`] of the last preset that this position includes.
     pub presets: u8,
-    /// Where the readings of the sensor would be as a position: [`position`](ChannelValues::position), but for readings that
-    /// are not believed.
+    /// The position that the readings of the sensor would give: equal to [`position`](ChannelValues::position) unless
+    /// the readings are rejected as implausible.
     pub reading: u32,
 }
 
-/// The commands that were carried out, and the one that waits.
+/// The counter of the commands that were taken, and the command that waits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pending {
     count: u8,
@@ -61,7 +61,7 @@ impl Pending {
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     input: Input,
-    /// Of the sensor, for what is kept of it.
+    /// Resolution of the sensor, saved with the retained position.
     resolution: u32,
     position: Position,
     speedometer: Speedometer,
@@ -75,20 +75,21 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// A channel that has not measured yet, with what it kept. The offset belongs to the scale of the parameters.
+    /// A channel that has not measured yet, with its retained position. `offset` belongs to the scale of the
+    /// parameters.
     #[inline(never)]
     pub(super) fn new(
         all: &Parameters,
         own: &ChannelParameters,
         sensor: Sensor,
-        kept: &KeptChannel,
+        retained: &RetainedChannel,
         offset: i32,
     ) -> Channel {
         let scale = all.scale(&sensor);
         let resolution = sensor.resolution();
-        let found = kept.found(sensor.kind, resolution);
+        let start = retained.start_position(sensor.kind, resolution);
         let mut channel = Channel {
-            input: Input::new(sensor, &scale, all.module.offset, found),
+            input: Input::new(sensor, &scale, all.module.offset, start),
             resolution,
             position: Position::new(scale, offset),
             speedometer: Speedometer::new(0),
@@ -104,12 +105,12 @@ impl Channel {
         channel
     }
 
-    /// Whether it is one of this sensor: another sensor needs another channel.
+    /// Whether the channel belongs to this sensor: another sensor needs another channel.
     pub(super) fn is_of(&self, sensor: &Sensor) -> bool {
         sensor.is_like(self.input.sensor())
     }
 
-    /// Takes over parameters, from the next sample on.
+    /// Takes over parameters; they act from the next sample on.
     #[inline(never)]
     pub(super) fn apply(&mut self, all: &Parameters, own: &ChannelParameters, sensor: Sensor) {
         let scale = all.scale(&sensor);
@@ -166,34 +167,34 @@ impl Channel {
         }
     }
 
-    /// Where the readings would be as a position.
+    /// The position that the readings would give, were they accepted.
     fn reading(&self, position: u32) -> u32 {
         let there = self.input.doubtful();
         there.map_or(position, |there| self.position.scale().value(there.shaft(), self.position.offset()))
     }
 
-    /// What outlives a loss of power with a battery.
-    pub(super) fn kept(&self) -> KeptChannel {
+    /// The state to be retained in the memory with the battery.
+    pub(super) fn retained(&self) -> RetainedChannel {
         let kind = self.input.sensor().kind;
         let (trust, needs_memory) = (Trust::from_bits(self.input.trust()), self.input.needs_memory());
-        let kept = |left| KeptChannel::new(kind, self.resolution, left);
-        match (self.input.tracker(), self.input.left()) {
-            (Some(tracker), _) => kept(Left { total: tracker.total(), trust, needs_memory }),
-            (None, Some(left)) => kept(left),
-            (None, None) => KeptChannel::unread((trust.lost, needs_memory)),
+        let retained = |last| RetainedChannel::new(kind, self.resolution, last);
+        match (self.input.tracker(), self.input.last()) {
+            (Some(tracker), _) => retained(LastPosition { total: tracker.total(), trust, needs_memory }),
+            (None, Some(last)) => retained(last),
+            (None, None) => RetainedChannel::unread((trust.lost, needs_memory)),
         }
     }
 
-    /// The same in its stored form, in its place.
+    /// Writes the same state to `words`, in its stored form.
     #[inline]
-    pub(super) fn retain(&self, words: &mut [u32; KeptChannel::WORDS]) {
+    pub(super) fn retain(&self, words: &mut [u32; RetainedChannel::WORDS]) {
         match self.input.tracker() {
             Some(tracker) => {
                 let kind = self.input.sensor().kind;
                 let (trust, needs_memory) = (self.input.trust(), self.input.needs_memory());
-                *words = KeptChannel::words(kind, self.resolution, tracker.total(), trust, needs_memory);
+                *words = RetainedChannel::words(kind, self.resolution, tracker.total(), trust, needs_memory);
             }
-            None => *words = self.kept().to_words(),
+            None => *words = self.retained().to_words(),
         }
     }
 }

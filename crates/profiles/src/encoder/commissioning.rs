@@ -1,18 +1,19 @@
 //! The commissioning diagnostic: object 6000h bit 1, with its result in alarm bit 1 (6503h).
 //!
-//! CiA 406 wants "an extensive check of the components responsible for position detection" and leaves it to the maker.
-//! This is what is checked while the bit is set, in one channel each:
+//! CiA 406 wants "an extensive check of the components responsible for position detection" and leaves the check to the
+//! manufacturer. While the bit is set, each channel is checked as follows:
 //!
-//! * every frame of an absolute encoder is there, has its parity, shows no alarm of the encoder, and lies no further
-//!   from the one before than the sensor can have moved: so a line, a supply or a code with a gap fails at standstill,
-//!   within a second;
-//! * over two turns (of a rod: 8192 steps) made without a rest, every bit of the code within a turn is both 0 and 1: one
-//!   that never changes is stuck. Only bits that such a movement cannot step over are judged, so the slower the
-//!   shaft turns, the more bits are: all of them at one step a millisecond, or 7 rpm with 13 bits;
-//! * an incremental encoder is not faster than it may be, shows its index within two turns, and shows it whole turns
+//! * Absolute encoder, every frame: the frame is there, its parity is right, it shows no alarm, and its position is no
+//!   further from the one before than the sensor can have moved. A fault of the line, the supply or the code therefore
+//!   shows at standstill, within a second.
+//! * Absolute encoder, over two turns without a rest (linear encoder: 8192 steps): every bit of the code within a turn
+//!   must have been both 0 and 1; a bit that never changes is stuck. Only bits that such a movement cannot step over
+//!   are judged. The slower the shaft turns, the more bits are judged: all of them at one step a millisecond, or 7 rpm
+//!   with 13 bits.
+//! * Incremental encoder: it is not faster than allowed, its index comes within two turns, and indexes are whole turns
 //!   apart.
 //!
-//! The diagnostic starts when the bit is set and ends when it is cleared or something fails.
+//! The diagnostic starts when the bit is set. It ends when the bit is cleared or something fails.
 
 use core::num::NonZeroU64;
 
@@ -23,42 +24,42 @@ use super::input::{
 
 /// Milliseconds after which standstill is checked.
 const STANDSTILL_MILLIS: u32 = 1000;
-/// Milliseconds without movement that are a rest.
+/// Milliseconds without movement that count as a rest.
 const REST_MILLIS: u32 = 100;
-/// Bits of a rod's code that are checked: those of 4096 steps.
+/// Bits of a linear encoder's code that are checked: 4096 steps.
 const ROD_BITS: u32 = 12;
 
-/// How far the commissioning diagnostic is.
+/// Progress of the commissioning diagnostic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Progress {
-    /// It is not asked for.
+    /// The diagnostic is off.
     #[default]
     Off = 0,
-    /// It runs.
+    /// The diagnostic runs, without a result so far.
     Running = 1,
-    /// One second was good.
+    /// One second without a fault.
     GoodAtRest = 2,
-    /// Two turns were good.
+    /// Two turns without a fault.
     GoodOverTurns = 3,
-    /// A reading was bad: the sensor state said why.
+    /// A reading was bad; the sensor state has said why.
     BadReading = 0x81,
     /// A bit of the code does not change.
     StuckBit = 0x82,
-    /// The index did not come, or not where it should.
+    /// The index did not come, or came in the wrong place.
     BadIndex = 0x83,
     /// Faster than the sensor can follow.
     TooFast = 0x84,
 }
 
 impl Progress {
-    /// As an object.
+    /// The value of the object.
     #[must_use]
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// Whether something was found.
+    /// Whether the diagnostic has failed.
     #[must_use]
     pub fn is_failure(self) -> bool {
         self.code() & 0x80 != 0
@@ -80,7 +81,7 @@ pub(super) struct Commissioning {
 struct Run {
     millis: u32,
     travel: i64,
-    /// Bits of the code that have been 1, and those that have been 0.
+    /// Bits of the code that have been 1; `zeros` has the bits that have been 0.
     ones: u32,
     zeros: u32,
 }
@@ -92,8 +93,8 @@ impl Run {
         (self.ones, self.zeros) = (self.ones | seen.code, self.zeros | !seen.code);
     }
 
-    /// Whether one of the lowest so many bits never changed, though the movement was slow enough to show it: a bit keeps
-    /// its value for as many steps as it is worth, or twice as many in Gray code.
+    /// Whether one of the lowest `bits` bits never changed, though the movement was slow enough to show a change: a bit
+    /// of weight n keeps its value for n steps, or for 2n steps in Gray code.
     fn has_stuck_bit(&self, bits: u32) -> bool {
         let millis = NonZeroU64::new(self.millis.into()).unwrap_or(NonZeroU64::MIN);
         let mean = self.travel.unsigned_abs().saturating_add(millis.get() - 1) / millis;
@@ -116,7 +117,7 @@ impl Commissioning {
         self.progress
     }
 
-    /// Looks at a sample.
+    /// Checks a sample.
     pub(super) fn observe(&mut self, sensor: &Sensor, seen: &Observation) {
         if self.progress != Progress::Off && !self.progress.is_failure() {
             self.go_on(sensor, seen);
@@ -148,7 +149,7 @@ impl Commissioning {
         }
     }
 
-    /// Whether the run was two turns long.
+    /// Whether the movement was two turns long.
     fn is_over(&self, sensor: &Sensor) -> bool {
         self.run.travel.unsigned_abs() >= 2 * turn(sensor)
     }

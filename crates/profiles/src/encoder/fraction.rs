@@ -1,18 +1,18 @@
 //! Multiplication by a fraction without a division.
 //!
-//! A 64-bit division is a library call of more than a hundred instructions on a Cortex-M4; this is three
+//! A 64-bit division is a library call of more than a hundred instructions on a Cortex-M4. The method here needs three
 //! multiplications.
 
 use core::num::NonZeroU32;
 
-/// A fraction: a whole number, and what is left of it.
+/// A fraction: its whole part and its remainder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Fraction {
     whole: u32,
-    /// Less than the denominator.
+    /// Numerator of the remainder, less than the denominator.
     numerator: u32,
     denominator: NonZeroU32,
-    /// What is left in units of 2^-32, rounded down.
+    /// The remainder in units of 2^-32, rounded down.
     approximation: u64,
 }
 
@@ -26,9 +26,9 @@ impl Fraction {
 
     /// `value * numerator / denominator`, rounded down, exactly, modulo 2^32.
     ///
-    /// The approximation is less than 2^-32 too small and the value below 2^32, so the estimate is less than 1 too small
-    /// before it is rounded down: it is the result or the result less 1, and the remainder tells which.
-    #[allow(clippy::cast_possible_truncation)] // The part is at most `value`.
+    /// The approximation is less than 2^-32 too small and the value is below 2^32, so the unrounded estimate is less
+    /// than 1 too small. Rounded down, the estimate is the result or the result minus 1; the remainder tells which.
+    #[allow(clippy::cast_possible_truncation)] // The fractional part is at most `value`.
     pub(super) fn of(self, value: u32) -> u32 {
         let whole = value.wrapping_mul(self.whole);
         let value = u64::from(value);

@@ -1,10 +1,10 @@
-//! From what the hardware has read to the movement of one sensor.
+//! From the readings of the hardware to the movement of one sensor.
 
 use crate::board::RawEncoder;
 use core::num::{NonZeroU32, NonZeroU64};
 
+use super::implausible::ImplausibleReadings;
 use super::reference::{Marks, Reference, Trust};
-use super::stray::Stray;
 use super::{Fault, Scale, Sensor, Tracker};
 
 /// Sensor state: the encoder does not answer.
@@ -13,103 +13,105 @@ pub const SENSOR_NO_SIGNAL: u8 = 1 << 0;
 pub const SENSOR_PARITY: u8 = 1 << 1;
 /// Sensor state: the encoder sends its alarm bit.
 pub const SENSOR_ALARM: u8 = 1 << 2;
-/// Sensor state: the readings are further away than the sensor can have moved. The position is the last one before that.
+/// Sensor state: the readings are further away than the sensor can have moved. The position stays at the last good
+/// reading.
 pub const SENSOR_IMPLAUSIBLE: u8 = 1 << 3;
-/// Sensor state: the index did not come, or not where it should: steps were lost or are too many.
+/// Sensor state: the index did not come, or came in the wrong place. Steps were lost or counted twice.
 pub const SENSOR_INDEX: u8 = 1 << 4;
-/// Sensor state: the index has not been seen yet; with a position error, the turns are not known.
+/// Sensor state: the index has not been seen yet. Together with a position error: the number of turns is unknown.
 pub const SENSOR_UNREFERENCED: u8 = 1 << 5;
 /// Sensor state: more steps in a millisecond than the sensor can follow.
 pub const SENSOR_TOO_FAST: u8 = 1 << 6;
 /// Sensor state: the position is not accurate.
 pub const SENSOR_POSITION_ERROR: u8 = 1 << 7;
 
-/// Sensor state: there is no reading of this millisecond, the position is the last one that was read.
+/// Sensor state: this millisecond has no usable reading, so the position is that of the last good one.
 pub const SENSOR_HELD: u8 = SENSOR_NO_SIGNAL | SENSOR_PARITY | SENSOR_IMPLAUSIBLE;
 
-/// Milliseconds without a good reading that are no position error: one disturbed frame is none, the position is then
-/// one millisecond old.
+/// Milliseconds without a good reading before a position error is reported: after one disturbed frame the position is
+/// only one millisecond old, which is no error.
 const TOLERATED_MISSES: u32 = 2;
 
-/// Milliseconds that a gap between two samples has at most: within that time the sampling is started anew.
+/// Longest gap between two samples in milliseconds: within this time the sampling is restarted.
 const GAP_MILLIS: u32 = 10;
-/// Samples that show a gap: a word of SSI is that of the sample before.
+/// Samples that a gap affects: an SSI word belongs to the sample before.
 const GAP_SAMPLES: u8 = 2;
 
-/// The part of all that a code tells apart, at both its ends, from which a sensor may leave the code in the dark.
+/// Divisor for the two ends of the code's range (1/512 each) in which a sensor may leave the range while the power is
+/// off.
 const EDGE: i64 = 512;
 
-/// What one sample says about the movement.
+/// Result of one sample: state and movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Observation {
     /// Bits of the sensor state.
     pub(super) state: u8,
-    /// Steps moved.
+    /// Movement in steps.
     pub(super) moved: i32,
-    /// The position as it was coded on the line.
+    /// The position as coded on the line.
     pub(super) code: u32,
 }
 
-/// Where a position was left.
+/// The position at the last loss of power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Left {
+pub(super) struct LastPosition {
     /// Steps from the origin.
     pub(super) total: i64,
-    /// How far it can be trusted.
+    /// How far the position can be trusted.
     pub(super) trust: Trust,
     /// See [`Input::needs_memory`].
     pub(super) needs_memory: bool,
 }
 
-/// What a start knows of a sensor.
+/// Retained knowledge of a sensor at start.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Found {
-    /// Where it was left.
-    pub(super) left: Option<Left>,
-    /// Its position was to be kept, and was lost.
+pub(super) struct StartPosition {
+    /// The retained position.
+    pub(super) last: Option<LastPosition>,
+    /// A position should have been retained, and was lost.
     pub(super) lost: bool,
 }
 
-/// The sensor at work.
+/// The input of one sensor, with its state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Input {
     sensor: Sensor,
-    /// From the sensor's own zero to that of the encoder (650Ah:1).
+    /// Distance from the zero of the sensor to the zero of the encoder (650Ah:1).
     offset: i32,
-    left: Option<Left>,
+    last: Option<LastPosition>,
     reference: Reference,
-    /// The code comes round before the position does, so that it matters how often.
+    /// The code wraps before the position does, so the number of wraps matters.
     comes_round: bool,
-    /// The code has come to one of its ends: without a memory of it nobody knows how often it has come round.
+    /// The code has come near one of its ends: from then on only retained memory tells how often the code has wrapped.
     needs_memory: bool,
-    /// `None` until the first good reading.
+    /// The counted position; `None` until the first good reading.
     tracker: Option<Tracker>,
     /// Milliseconds since the last good reading.
     missed: u32,
-    /// Steps in the last millisecond with a good reading.
+    /// Steps moved in the last millisecond with a good reading.
     step: i32,
-    /// Readings that are not believed.
-    stray: Option<Stray>,
-    /// Samples for which the sensor may have moved further than in a millisecond.
+    /// Readings rejected as implausible.
+    implausible: Option<ImplausibleReadings>,
+    /// Number of coming samples in which the sensor may have moved further than in a millisecond.
     gap: u8,
 }
 
 impl Input {
     /// A sensor that has not been read yet.
-    pub(super) fn new(sensor: Sensor, scale: &Scale, offset: i32, found: Found) -> Input {
-        let Found { left, lost } = found;
-        let trust = left.map_or(Trust { lost, ..Trust::default() }, |left| left.trust);
+    pub(super) fn new(sensor: Sensor, scale: &Scale, offset: i32, start: StartPosition) -> Input {
+        let StartPosition { last, lost } = start;
+        let trust = last.map_or(Trust { lost, ..Trust::default() }, |last| last.trust);
         Input {
             sensor,
             offset,
-            left,
+            last,
             reference: Reference::new(marks(&sensor, scale), trust),
             comes_round: comes_round(&sensor, scale),
-            needs_memory: left.is_some_and(|left| left.needs_memory),
+            needs_memory: last.is_some_and(|last| last.needs_memory),
             tracker: None,
             missed: 0,
             step: 0,
-            stray: None,
+            implausible: None,
             gap: 0,
         }
     }
@@ -119,7 +121,7 @@ impl Input {
         &self.sensor
     }
 
-    /// Takes another description of the same sensor, moves the zero, and counts in the turns of this scale.
+    /// Takes other parameters of the same sensor: moves the zero, and counts in the turns of this scale.
     pub(super) fn apply(&mut self, sensor: Sensor, scale: &Scale, offset: i32) {
         self.sensor = sensor;
         self.reference.apply(marks(&sensor, scale));
@@ -133,22 +135,22 @@ impl Input {
         }
     }
 
-    /// The position is known from here on, as a preset says: what the sensor reads is believed, and the count put right.
+    /// A preset makes the position known: the present reading is accepted, and the count is corrected.
     #[inline(never)]
     pub(super) fn refer(&mut self) {
         let correction = self.reference.preset();
         if let Some(tracker) = &mut self.tracker {
-            if let Some(stray) = self.stray.take() {
-                tracker.follow(stray.word());
+            if let Some(implausible) = self.implausible.take() {
+                tracker.follow(implausible.word());
             }
             tracker.correct(correction);
         }
     }
 
-    /// Where the shaft is by readings or an index that are not believed; `None` while they are.
+    /// The position by rejected readings or by a rejected index; `None` while nothing is rejected.
     #[inline]
     pub(super) fn doubtful(&self) -> Option<Tracker> {
-        let is_believed = self.stray.is_none() && self.reference.state() & SENSOR_INDEX == 0;
+        let is_believed = self.implausible.is_none() && self.reference.state() & SENSOR_INDEX == 0;
         if is_believed { None } else { self.as_read() }
     }
 
@@ -156,19 +158,19 @@ impl Input {
     fn as_read(&self) -> Option<Tracker> {
         let correction = self.reference.correction();
         let mut tracker = self.tracker?;
-        if let Some(stray) = self.stray {
-            tracker.follow(stray.word());
+        if let Some(implausible) = self.implausible {
+            tracker.follow(implausible.word());
         }
         tracker.correct(correction);
         Some(tracker)
     }
 
-    /// Where the shaft is; `None` until the first good reading.
+    /// The counted position; `None` until the first good reading.
     pub(super) fn tracker(&self) -> Option<&Tracker> {
         self.tracker.as_ref()
     }
 
-    /// Position in the sensor's own steps, from the zero of the encoder on (650Ah).
+    /// Position in native steps of the sensor, from the zero of the encoder (650Ah).
     pub(super) fn native(&self) -> i64 {
         let Some(tracker) = &self.tracker else { return 0 };
         if !self.sensor.kind.is_absolute() {
@@ -177,21 +179,22 @@ impl Input {
         i64::from(tracker.word()) + i64::from(self.offset)
     }
 
-    /// How far the position can be trusted at the next start: bits of [`Trust`]. Readings that are not believed now are not believed then.
+    /// How far the position can be trusted at the next start: bits of [`Trust`]. While readings are rejected, the
+    /// position counts as lost.
     #[inline]
     pub(super) fn trust(&self) -> u8 {
-        self.reference.trust() | if self.stray.is_some() { Trust::LOST } else { 0 }
+        self.reference.trust() | if self.implausible.is_some() { Trust::LOST } else { 0 }
     }
 
-    /// Whether nothing but a memory knows how often the code has come round.
+    /// Whether only retained memory tells how often the code has wrapped.
     #[inline]
     pub(super) fn needs_memory(&self) -> bool {
         self.needs_memory
     }
 
-    /// Where it was left before the start, as long as it has not been read.
-    pub(super) fn left(&self) -> Option<Left> {
-        self.left
+    /// The retained position, until the sensor has been read.
+    pub(super) fn last(&self) -> Option<LastPosition> {
+        self.last
     }
 
     /// Takes a sample.
@@ -223,15 +226,15 @@ impl Input {
         Observation { state: alarm | self.reference.state(), moved: self.step, code: reading.code }
     }
 
-    /// Whether the sensor can be there.
+    /// Whether the sensor can have moved to this reading.
     #[inline]
     fn is_plausible(&mut self, word: u32) -> bool {
         let fastest = self.sensor.fastest;
         let Some(tracker) = &self.tracker else { return true };
-        let is_back = match &mut self.stray {
+        let is_back = match &mut self.implausible {
             _ if fastest == 0 => true,
-            Some(stray) => stray.is_back(word, fastest),
-            // The longer nothing was read, the further it may have moved.
+            Some(implausible) => implausible.is_back(word, fastest),
+            // The longer there was no reading, the further the sensor may have moved.
             None if self.missed == 0 && self.gap == 0 => tracker.distance(word).unsigned_abs() <= fastest,
             None => {
                 let gap = if self.gap > 0 { GAP_MILLIS } else { 0 };
@@ -240,21 +243,22 @@ impl Input {
             }
         };
         if is_back {
-            self.stray = None;
-        } else if self.stray.is_none() {
-            self.stray = Some(Stray::new(self.sensor.bits(), tracker.word(), self.step, word, fastest));
+            self.implausible = None;
+        } else if self.implausible.is_none() {
+            self.implausible =
+                Some(ImplausibleReadings::new(self.sensor.bits(), tracker.word(), self.step, word, fastest));
         }
         is_back
     }
 
-    /// The position stays where it was before the readings went away.
+    /// Keeps the position where it was before the readings jumped.
     fn stay(&self) -> Observation {
-        let lasts = self.stray.is_some_and(|stray| stray.readings() > TOLERATED_MISSES);
+        let lasts = self.implausible.is_some_and(|implausible| implausible.readings() > TOLERATED_MISSES);
         let error = if lasts { SENSOR_POSITION_ERROR } else { 0 };
         Observation { state: SENSOR_IMPLAUSIBLE | error | self.reference.state(), ..Observation::default() }
     }
 
-    /// There is a reading again. Where the code may have come round in the meantime, nobody knows how often.
+    /// Good readings are back. If the code may have wrapped in the meantime, the number of wraps is unknown.
     #[inline(never)]
     fn come_back(&mut self) {
         let most = u64::from(self.sensor.fastest) * (u64::from(self.missed) + 1);
@@ -274,8 +278,8 @@ impl Input {
     }
 
     fn miss(&mut self, state: u8) -> Observation {
-        if let Some(stray) = &mut self.stray {
-            stray.skip();
+        if let Some(implausible) = &mut self.implausible {
+            implausible.skip();
         }
         self.missed = self.missed.saturating_add(1);
         let error = if self.missed > TOLERATED_MISSES { SENSOR_POSITION_ERROR } else { 0 };
@@ -309,25 +313,25 @@ impl Input {
         0
     }
 
-    /// The first reading says where to go on.
+    /// The first reading: decides where counting continues.
     #[inline(never)]
     fn begin(&mut self, word: u32, scale: &Scale) {
         let (turn, bits) = (scale.turn(), self.sensor.bits());
-        let total = match self.left {
-            Some(left) if self.sensor.kind.is_absolute() => {
-                // Where it was left, and from there the shorter way to where it is now.
-                let then = low_word(left.total.wrapping_sub(self.offset.into()));
-                let moved = Tracker::new(turn, bits, then, left.total).distance(word);
-                left.total.saturating_add(moved.into())
+        let total = match self.last {
+            Some(last) if self.sensor.kind.is_absolute() => {
+                // From the retained position, the shorter way to the present reading.
+                let then = low_word(last.total.wrapping_sub(self.offset.into()));
+                let moved = Tracker::new(turn, bits, then, last.total).distance(word);
+                last.total.saturating_add(moved.into())
             }
-            Some(left) => left.total,
+            Some(last) => last.total,
             None if self.sensor.kind.is_absolute() => i64::from(word) + i64::from(self.offset),
             None => self.offset.into(),
         };
         self.tracker = Some(Tracker::new(turn, bits, word, total));
     }
 
-    /// The index is the zero of a rod, and of every turn of a shaft.
+    /// Takes an index: the zero of a linear encoder, and of every turn of a shaft.
     fn take_index(&mut self, captured: u16) {
         let Some(tracker) = &mut self.tracker else { return };
         let ahead = tracker.distance(captured.into());
@@ -345,7 +349,7 @@ impl Input {
     }
 }
 
-/// How the index of a sensor comes.
+/// Properties of a sensor's index.
 fn marks(sensor: &Sensor, scale: &Scale) -> Marks {
     let is_used = sensor.index && !sensor.kind.is_absolute();
     let is_linear = sensor.kind.is_linear();
@@ -356,10 +360,11 @@ fn marks(sensor: &Sensor, scale: &Scale) -> Marks {
     }
 }
 
-/// Whether the code of an absolute sensor comes round before the position does: it has not a whole number of ranges.
+/// Whether the code of an absolute sensor wraps before the position does: the code is not a whole number of ranges
+/// long.
 fn comes_round(sensor: &Sensor, scale: &Scale) -> bool {
     let units = (1 << sensor.bits().min(32)) * u64::from(scale.units());
-    // A turn and a range have at most 2^32 steps each.
+    // A turn and a range have at most 2^32 steps each, so their product fits 64 bits.
     let range = NonZeroU64::from(scale.turn()).saturating_mul(scale.range());
     sensor.kind.is_absolute() && units % range != 0
 }

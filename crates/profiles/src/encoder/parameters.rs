@@ -15,19 +15,20 @@ pub const SCALING: u16 = 1 << 2;
 /// Operating parameter (6000h): the measuring direction is reverse. Linear encoders only.
 pub const DIRECTION: u16 = 1 << 3;
 
-/// The fastest movement (2104h) is that of [`HIGHEST_SPEED`] for a shaft, and of [`HIGHEST_RATE`] for a rod.
+/// Value of 2104h: the fastest movement follows from [`HIGHEST_SPEED`] for a shaft, from [`HIGHEST_RATE`] for a linear
+/// encoder.
 pub const AUTOMATIC: u32 = u32::MAX;
-/// Revolutions a minute that no encoder is built for.
+/// Revolutions per minute above the range of any encoder.
 pub const HIGHEST_SPEED: u32 = 12_000;
-/// The way of a rod in nm in a millisecond, or in um a second, that no encoder is built for: 20 m/s.
+/// Speed of a linear encoder above the range of any: 20 m/s, in nm per millisecond or um per second.
 pub const HIGHEST_RATE: u32 = 20_000_000;
 
-/// A command: it is carried out once, when `count` has changed to anything but 0, which means that there was none yet.
+/// A command. It is carried out once per change of `count`; a count of 0 means that no command has been given yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Command {
-    /// What to do: a preset value, or a mask of alarms to clear.
+    /// The argument: a preset value, or a mask of alarms to clear.
     pub value: u32,
-    /// Commands given up to now.
+    /// Number of commands given so far.
     pub count: u8,
 }
 
@@ -40,13 +41,14 @@ pub struct ChannelParameters {
     pub resolution: NonZeroU32,
     /// See [`Sensor::counted`].
     pub counted: NonZeroU16,
-    /// See [`Sensor::fastest`]; [`AUTOMATIC`] for what follows from the resolution.
+    /// See [`Sensor::fastest`]; [`AUTOMATIC`] for a value that follows from the resolution.
     pub fastest: u32,
-    /// The offset that was stored (650Ch), for the start alone: it belongs to the scale that was stored with it.
+    /// The stored offset (650Ch), used at start alone. It belongs to the scale that was stored with it.
     pub offset: i32,
     /// Preset (6003h, 6010h).
     pub preset: Command,
-    /// Counts how often somebody else has found an offset, and has said with that where the sensor is; 0 for never.
+    /// Counts the offsets found by another part of the device, which also tells that the position of the sensor is
+    /// right; 0 for none.
     pub references: u8,
     /// Cams (6301h to 6337h).
     pub cams: Cams,
@@ -57,7 +59,7 @@ pub struct ChannelParameters {
 /// The parameters of the encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameters {
-    /// Operating parameters (6000h), see [`SCALING`] and the others.
+    /// Operating parameters (6000h): [`SCALING`] and the other bits.
     pub operating: u16,
     /// Measuring units per revolution (6001h).
     pub per_revolution: u32,
@@ -67,8 +69,8 @@ pub struct Parameters {
     pub step: u32,
     /// Speed measuring step of a linear encoder in 0.01 mm/s (6005h:2).
     pub speed_step: u32,
-    /// What a revolution of a shaft is in um of a way that is measured: then every sensor counts in `step` and
-    /// `speed_step` as a linear one does, over all that it tells apart. `None` outside of lifts.
+    /// Travel per revolution of a shaft in um. If given, every sensor counts in `step` and `speed_step` like a linear
+    /// encoder, over all positions that the sensor distinguishes. `None` outside of lifts.
     pub travel: Option<NonZeroU32>,
     /// Sub-indexes 1 and 2 of the objects with channels.
     pub channels: [ChannelParameters; 2],
@@ -76,16 +78,16 @@ pub struct Parameters {
     pub format: Format,
     /// Whether the index input is used.
     pub index: bool,
-    /// What the manufacturer says about the sensors (650Ah).
+    /// Manufacturer's data of the sensors (650Ah).
     pub module: Module,
-    /// Limits of what the board measures.
+    /// Limits of the board's measurements.
     pub limits: Limits,
-    /// Clears alarms.
+    /// Acknowledgement of alarms.
     pub acknowledge: Command,
 }
 
 impl Default for ChannelParameters {
-    /// Not used.
+    /// An unused channel.
     fn default() -> ChannelParameters {
         ChannelParameters {
             kind: None,
@@ -124,7 +126,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// The encoder type of object 1000h: that of the sensor, or 10 for two of them. 0 for none.
+    /// The encoder type of object 1000h: the type of the one sensor, 10 for two sensors, 0 for none.
     #[must_use]
     pub fn encoder_type(&self) -> u8 {
         match self.channels.map(|channel| channel.kind) {
@@ -148,7 +150,7 @@ impl Parameters {
         self.channels.iter().filter_map(|channel| self.sensor(channel))
     }
 
-    /// How the board has to read the sensors.
+    /// The board inputs to be read for the sensors.
     #[must_use]
     pub fn inputs(&self) -> PositionInputs {
         let is_absolute = self.sensors().any(|sensor| sensor.kind.is_absolute());
@@ -161,22 +163,23 @@ impl Parameters {
         self.natives().all(|native| native.gives_step(nanometres))
     }
 
-    /// Whether the scaling function works as it is asked for, with every sensor.
+    /// Whether every sensor can give the scaling that the parameters ask for.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         self.sensors().all(|sensor| self.asked_scale(&sensor).is_some())
     }
 
-    /// The scale of a sensor: the one asked for, or the sensor's own steps where it cannot give that.
+    /// The scale of a sensor: the one asked for, or the sensor's own steps if it cannot give that one.
     #[must_use]
     pub fn scale(&self, sensor: &Sensor) -> Scale {
         self.asked_scale(sensor)
             .unwrap_or_else(|| Scale::unscaled(&sensor.native(), self.is_reversed(sensor)))
     }
 
-    /// Units of 6030h in a native step a second: measuring units of a shaft, speed measuring steps of a rod.
+    /// Units of 6030h per native step and second: measuring units of a shaft, speed measuring steps of a linear
+    /// encoder.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
+    #[allow(clippy::cast_precision_loss)] // The result has 15 bits, less than 24.
     pub fn speed_factor(&self, sensor: &Sensor) -> f32 {
         if let Some(nanometres) = self.way(sensor) {
             // A step of 6005h:2 is 0.01 mm/s: 10 000 nm/s.
@@ -186,7 +189,7 @@ impl Parameters {
         scale.units() as f32 / scale.turn().get() as f32
     }
 
-    /// The way of a native step in nm; `None` for the angle of a shaft.
+    /// Travel per native step in nm; `None` if the sensor measures an angle.
     #[allow(clippy::cast_precision_loss)]
     fn way(&self, sensor: &Sensor) -> Option<f32> {
         if sensor.kind.is_linear() {
@@ -195,14 +198,14 @@ impl Parameters {
         self.travel.map(|travel| travel.get() as f32 * 1000.0 / sensor.resolution() as f32)
     }
 
-    /// Object 6500h: the parameters as they are active. Bit 1 says that there is a commissioning diagnostic.
+    /// Object 6500h: the active parameters. Bit 1 says that the commissioning diagnostic is supported.
     #[must_use]
     pub fn operating_status(&self) -> u16 {
         let scaling = if self.is_consistent() { SCALING } else { 0 };
         COMMISSIONING | self.operating & (self.directions() | scaling)
     }
 
-    /// The bits of 6000h that turn the direction of one of the sensors.
+    /// The direction bits of 6000h that apply to one of the sensors.
     #[must_use]
     pub fn directions(&self) -> u16 {
         self.sensors().fold(0, |bits, sensor| bits | direction_bit(&sensor))
@@ -231,13 +234,13 @@ impl Parameters {
     }
 }
 
-/// Where the fastest movement follows from the resolution: with that.
+/// Replaces [`AUTOMATIC`] by the fastest movement that follows from the resolution.
 fn with_limit(sensor: Sensor) -> Sensor {
     if sensor.fastest != AUTOMATIC {
         return sensor;
     }
     let resolution = sensor.resolution();
-    // Half a turn in a millisecond could be a turn either way, and a speed is well below that.
+    // Half a turn in a millisecond could be either direction. The limit is well below that.
     let limit = if sensor.kind.is_linear() {
         HIGHEST_RATE / resolution.max(1)
     } else {

@@ -1,15 +1,15 @@
 //! The position value with its offset: objects 6003h, 6004h and 6509h.
 
-use super::{Scale, Shaft};
+use super::{Scale, ShaftPosition};
 
 /// A scale, the offset, and the position at which the present turn starts.
 ///
-/// The start of the next turn follows from that of this one by an addition, so that a sample needs no division.
+/// The start of the next turn is the start of this one plus the units in a turn, so a sample needs no division.
 #[derive(Clone, Copy, Debug)]
 pub struct Position {
     scale: Scale,
     offset: i32,
-    /// The scale of the last preset, and its offset.
+    /// The scale and the offset of the last preset.
     home: (Scale, i32),
     /// Units in a turn, modulo the range.
     per_turn: u32,
@@ -18,7 +18,7 @@ pub struct Position {
 }
 
 impl Position {
-    /// A position with an offset of which [`Scale::offset_for`] once said that it belongs to this scale.
+    /// A position with an offset that [`Scale::offset_for`] has given for this scale.
     #[must_use]
     pub fn new(scale: Scale, offset: i32) -> Position {
         Position {
@@ -44,8 +44,8 @@ impl Position {
     }
 
     /// The position value (6004h).
-    pub fn value(&mut self, shaft: Shaft) -> u32 {
-        let Shaft { turns, step } = self.scale.seen(shaft);
+    pub fn value(&mut self, shaft: ShaftPosition) -> u32 {
+        let ShaftPosition { turns, step } = self.scale.seen(shaft);
         self.start = match turns.wrapping_sub(self.turns) {
             0 => self.start,
             1 => self.scale.add(self.start, self.per_turn),
@@ -56,18 +56,18 @@ impl Position {
         self.scale.add(self.start, self.scale.within(step))
     }
 
-    /// Makes the value `preset` where the shaft is; a value outside of the range changes nothing.
+    /// Makes the value `preset` at the present place of the shaft. A value outside of the range changes nothing.
     #[inline(never)]
-    pub fn preset(&mut self, preset: u32, shaft: Shaft) {
+    pub fn preset(&mut self, preset: u32, shaft: ShaftPosition) {
         if let Some(offset) = self.scale.offset_for(preset, shaft) {
             *self = Position::new(self.scale, offset);
         }
     }
 
-    /// Takes another scale. The same units counted the other way leave the value as it is. In other units the offset has
-    /// lost its meaning and is 0, until the units are again those of the last preset. CiA 406 is silent about all of it.
+    /// Takes another scale. A change of direction alone keeps the value. In other units the offset has lost its
+    /// meaning: it is 0 until the units of the last preset come back. CiA 406 is silent about both.
     #[inline(never)]
-    pub fn rescale(&mut self, scale: Scale, shaft: Shaft) {
+    pub fn rescale(&mut self, scale: Scale, shaft: ShaftPosition) {
         if scale == self.scale {
             return;
         }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     proptest! {
-        /// With additions it is what it is with divisions.
+        /// Additions give the same value as divisions.
         #[test]
         fn agrees_with_the_scale(
             scale in any_scale(), offset: i32, start in -(1_i64 << 50)..1 << 50, walk in any_walk(),

@@ -1,51 +1,51 @@
-//! Whether a count can be trusted: what its index says, and what a loss of power has left of it.
+//! Whether a count can be trusted, judged by the index and by the state retained through a loss of power.
 //!
-//! The first index puts the position right. From then on:
+//! The first index corrects the position. From then on:
 //!
-//! * an index within two steps of its place confirms the count;
-//! * one that comes elsewhere is not believed: the position goes on as it was counted, and is an error. When the next one
-//!   agrees with it to whole turns, the count was wrong, and is put right. When the next one is in its place, the odd one
-//!   was a disturbance;
-//! * a turn and a quarter without an index means that the index is missing.
+//! * An index within two steps of its place confirms the count.
+//! * An index elsewhere is not accepted: the position follows the count and is reported as an error. If the next index
+//!   agrees with it to whole turns, the count was wrong and is corrected. If the next index is in its place, the odd
+//!   index was a disturbance.
+//! * A turn and a quarter without an index means that the index is missing.
 //!
-//! Movement faster than the sensor can follow puts the count in doubt, until an index confirms it. Turns that were lost
-//! with the memory that kept them come back with no index, unless the position repeats with every turn. A preset is
-//! a new reference and ends all of it.
+//! Movement faster than the sensor can follow puts the count in doubt, until an index confirms the count. Turns that
+//! were lost with the retained state are not restored by an index, unless the position repeats with every turn. A
+//! preset is a new reference and ends all of these errors.
 
 use core::num::NonZeroU32;
 
 use super::input::{SENSOR_INDEX, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED};
 
-/// Steps by which the index may come too early or too late: it is one quarter period wide and is seen at one edge
-/// forwards and at the other backwards; the capture may fall on either side of the step that causes it.
+/// Steps by which the index may come too early or too late. The index is one quarter period wide and is seen at one
+/// edge forwards and at the other backwards, and the capture may fall on either side of the step that causes it.
 const TOLERANCE: u64 = 2;
-/// Steps between two marks of a rod, at least: less is the same mark again.
+/// Least distance in steps between two indexes of a linear encoder: a closer one is the same index again.
 const ROD_APART: u32 = 64;
 
-/// What the last index has said.
+/// Result of the last index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Index {
-    /// It was in its place, or there was none yet.
+    /// The index was in its place, or there was none yet.
     Right,
-    /// It did not come.
+    /// The index did not come.
     Missing,
-    /// It came so many steps from its place.
+    /// The index came so many steps from its place.
     Elsewhere(i64),
 }
 
-/// What a start knows of the position.
+/// How far the position can be trusted at a start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Trust {
-    /// The index had been seen.
+    /// The index has been seen.
     pub(super) referenced: bool,
-    /// Turns were lost.
+    /// Turns have been lost.
     pub(super) lost: bool,
     /// Steps may have been lost.
     pub(super) doubted: bool,
 }
 
 impl Trust {
-    /// A bit for each.
+    /// One bit for each field.
     pub(super) fn bits(self) -> u8 {
         let Trust { referenced, lost, doubted } = self;
         let bit = |set: bool, bit: u8| if set { bit } else { 0 };
@@ -63,14 +63,14 @@ impl Trust {
     const DOUBTED: u8 = 1 << 2;
 }
 
-/// How the index comes.
+/// Properties of a sensor's index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Marks {
-    /// There is an index at all.
+    /// The sensor has an index, and it is used.
     pub(super) is_used: bool,
-    /// Steps from one to the next; `None` for a rod, which has one.
+    /// Steps between two indexes; `None` for a linear encoder, which has one index only.
     pub(super) turn: Option<NonZeroU32>,
-    /// The position repeats from one to the next, so that the index alone says where the sensor is.
+    /// The position repeats from one index to the next, so the index alone determines the position.
     pub(super) suffice: bool,
 }
 
@@ -82,18 +82,25 @@ pub(super) struct Reference {
     index: Index,
     /// Steps since the last index.
     since: i32,
-    /// Steps without an index that are too many.
+    /// Number of steps without an index beyond which the index is missing.
     too_many: u32,
-    /// Bits of the sensor state that follow.
+    /// Bits of the sensor state that result.
     state: u8,
-    /// What to know of it at the next start, as bits.
-    kept: u8,
+    /// Bits of [`Trust`] to be retained for the next start.
+    retained: u8,
 }
 
 impl Reference {
     pub(super) fn new(marks: Marks, trust: Trust) -> Reference {
-        let mut new =
-            Reference { marks, trust, index: Index::Right, since: 0, too_many: u32::MAX, state: 0, kept: 0 };
+        let mut new = Reference {
+            marks,
+            trust,
+            index: Index::Right,
+            since: 0,
+            too_many: u32::MAX,
+            state: 0,
+            retained: 0,
+        };
         new.settle();
         new
     }
@@ -114,12 +121,12 @@ impl Reference {
         self.state
     }
 
-    /// What to know of it at the next start: bits of [`Trust`].
+    /// Bits of [`Trust`] to be retained for the next start.
     pub(super) fn trust(&self) -> u8 {
-        self.kept
+        self.retained
     }
 
-    /// The sensor has moved.
+    /// Takes note of a movement.
     pub(super) fn moved(&mut self, steps: i32) {
         self.since = self.since.saturating_add(steps);
         if self.since.unsigned_abs() > self.too_many {
@@ -128,7 +135,7 @@ impl Reference {
         }
     }
 
-    /// An index may have come that nobody saw.
+    /// An index may have gone unseen: the distance to the next one starts anew.
     pub(super) fn forgive(&mut self) {
         self.since = 0;
     }
@@ -145,19 +152,19 @@ impl Reference {
         self.settle();
     }
 
-    /// An index has come so many steps from its place, and the sensor has moved `since` then. The steps by which the count is to be
-    /// put right.
+    /// Takes an index that came `error` steps from its place; the sensor has moved `since` steps after it. Returns the
+    /// steps by which to correct the count.
     #[inline]
     pub(super) fn index(&mut self, error: i64, since: i32) -> i64 {
         let is_right = error.unsigned_abs() <= TOLERANCE;
-        if is_right && self.kept == Trust::REFERENCED && self.index == Index::Right {
+        if is_right && self.retained == Trust::REFERENCED && self.index == Index::Right {
             self.since = since;
             return 0;
         }
         self.doubtful_index(error, since)
     }
 
-    /// One that is the first, or wrong, or comes after something was.
+    /// Takes an index that is the first one, is wrong, or comes after an error.
     #[inline(never)]
     fn doubtful_index(&mut self, error: i64, since: i32) -> i64 {
         let apart = self.since.wrapping_sub(since).unsigned_abs();
@@ -176,7 +183,8 @@ impl Reference {
         if is_first || (is_believed && !is_right) { error.wrapping_neg() } else { 0 }
     }
 
-    /// The position is known from here on, whatever was wrong. The steps by which the count is to be put right.
+    /// Takes a preset: the position is known, whatever was wrong before. Returns the steps by which to correct the
+    /// count.
     pub(super) fn preset(&mut self) -> i64 {
         let correction = self.correction();
         if self.index == Index::Missing {
@@ -188,13 +196,13 @@ impl Reference {
         correction
     }
 
-    /// The steps by which the count would be right if the last index were.
+    /// The steps by which to correct the count if the last index were accepted.
     #[inline]
     pub(super) fn correction(&self) -> i64 {
         if let Index::Elsewhere(error) = self.index { error.wrapping_neg() } else { 0 }
     }
 
-    /// Whether the index before was as far from its place, whole turns away.
+    /// Whether the last index was as far from its place, apart from whole turns.
     fn agrees(&self, error: i64, apart: u32) -> bool {
         let Index::Elsewhere(before) = self.index else { return false };
         let difference = error.abs_diff(before);
@@ -202,7 +210,7 @@ impl Reference {
         self.is_another(apart) && (difference <= TOLERANCE || is_turn)
     }
 
-    /// Whether an index so many steps from the one before is another one, and not the same again.
+    /// Whether an index `apart` steps from the last one is another index, and not the same one again.
     fn is_another(&self, apart: u32) -> bool {
         apart > self.marks.turn.map_or(ROD_APART, |turn| turn.get() / 2)
     }
@@ -217,8 +225,8 @@ impl Reference {
             | bit(lost, SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR)
             | bit(doubted, SENSOR_POSITION_ERROR)
             | bit(is_wrong, SENSOR_INDEX | SENSOR_POSITION_ERROR);
-        self.kept = Trust { doubted: doubted || is_wrong, ..self.trust }.bits();
-        // Once it is missing, it is missing until it comes.
+        self.retained = Trust { doubted: doubted || is_wrong, ..self.trust }.bits();
+        // A missing index stays missing until it comes.
         let is_due = self.marks.is_used && referenced && self.index != Index::Missing;
         let turn = self.marks.turn.filter(|_| is_due).map_or(u32::MAX, NonZeroU32::get);
         self.too_many = turn.saturating_add(turn / 4).saturating_add(4);
@@ -236,7 +244,7 @@ mod tests {
         Marks { is_used: true, turn: NonZeroU32::new(4096), suffice: false }
     }
 
-    /// One that has seen its index.
+    /// A reference that has seen its index.
     fn seen() -> Reference {
         Reference::new(marks(), Trust { referenced: true, ..Trust::default() })
     }

@@ -2,35 +2,35 @@
 
 use core::num::{NonZeroU32, NonZeroU64};
 
-use super::Shaft;
+use super::ShaftPosition;
 use super::fraction::Fraction;
 
 /// Number of different values of an UNSIGNED32: more positions cannot be told apart.
 const MOST: NonZeroU64 = NonZeroU64::new(1 << 32).unwrap();
-/// Steps in a turn of a linear encoder are made many, so that a turn hardly ever ends.
+/// Steps in a turn of a linear encoder: as many as possible, so that a turn hardly ever ends.
 const LONG_TURN: NonZeroU32 = NonZeroU32::new(1 << 31).unwrap();
 
-/// What the sensor itself resolves.
+/// Resolution of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Native {
-    /// A shaft.
+    /// A rotary encoder.
     Rotary {
         /// Steps per revolution (6501h).
         per_revolution: NonZeroU32,
-        /// Revolutions it can tell apart (6502h).
+        /// Revolutions that the sensor distinguishes (6502h).
         revolutions: NonZeroU32,
     },
-    /// A rod.
+    /// A linear encoder.
     Linear {
         /// Measuring step in nm (6501h).
         step: NonZeroU32,
-        /// Steps it can tell apart.
+        /// Steps that the sensor distinguishes.
         steps: NonZeroU64,
     },
 }
 
 impl Native {
-    /// Steps it can tell apart.
+    /// Steps that the sensor distinguishes.
     #[must_use]
     pub fn steps(&self) -> NonZeroU64 {
         match *self {
@@ -41,7 +41,8 @@ impl Native {
         }
     }
 
-    /// Whether it can give this measuring step (6005h:1) in nm: not finer than the sensor. Means nothing to a shaft.
+    /// Whether the sensor can give this measuring step (6005h:1) in nm: the step is not finer than the sensor's.
+    /// Irrelevant for a shaft.
     #[must_use]
     pub fn gives_step(&self, nanometres: u32) -> bool {
         match *self {
@@ -51,10 +52,10 @@ impl Native {
     }
 }
 
-/// What the user asks for.
+/// Scaling requested by the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// Counts the other way: code sequence of a shaft, measuring direction of a rod (6000h).
+    /// Counts the other way: code sequence of a shaft, measuring direction of a linear encoder (6000h).
     pub reversed: bool,
     /// Scaling function, bit 2 of 6000h.
     pub scaling: bool,
@@ -62,14 +63,14 @@ pub struct Settings {
     pub per_revolution: u32,
     /// Total measuring range (6002h).
     pub range: u32,
-    /// Measuring step of a rod in nm (6005h:1).
+    /// Measuring step of a linear encoder in nm (6005h:1).
     pub step: u32,
 }
 
 /// Turns a mechanical position into a position value. Only usable scales can be built.
 ///
-/// The position repeats after `range` units, whatever its ratio to the units per turn is, and goes on without a
-/// jump for ever in both directions, because turns are counted without end (see [`Shaft`]).
+/// The position repeats after `range` units, whatever the ratio of the range to the units per turn. It continues
+/// without a jump in both directions for ever, because turns are counted without end (see [`ShaftPosition`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
     turn: NonZeroU32,
@@ -80,7 +81,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale of these settings; `None` where the sensor cannot give them (0609 0030h).
+    /// The scale of these settings; `None` if the sensor cannot give them (0609 0030h).
     #[must_use]
     pub fn new(native: &Native, settings: &Settings) -> Option<Scale> {
         if !settings.scaling {
@@ -95,9 +96,9 @@ impl Scale {
         Some(Scale::build(units, turn, range, settings.reversed))
     }
 
-    /// The scale of a way in units of `step` nm, as long as the sensor tells it apart. A shaft goes `travel` um in a
-    /// revolution, for which nothing is rounded however long the way gets. `None` where the sensor does not resolve the
-    /// step, or where the ratio of both needs more than 32 bits.
+    /// The scale of a travel in units of `step` nm, over all positions that the sensor distinguishes. A shaft travels
+    /// `travel` um in a revolution; nothing is rounded, however long the travel gets. `None` if the sensor does not
+    /// resolve the step, or if the ratio of both needs more than 32 bits.
     #[must_use]
     pub fn along(native: &Native, travel: NonZeroU32, step: NonZeroU32) -> Option<Scale> {
         let (nanometres, steps) = match *native {
@@ -113,7 +114,7 @@ impl Scale {
         Some(Scale::build(units, turn, NonZeroU64::new(range)?.min(MOST), false))
     }
 
-    /// The sensor's own steps.
+    /// The scale in the sensor's own steps.
     #[must_use]
     pub fn unscaled(native: &Native, reversed: bool) -> Scale {
         let turn = match *native {
@@ -127,8 +128,8 @@ impl Scale {
         Scale { turn, units, range, reversed, within: Fraction::new(units, turn) }
     }
 
-    /// Native steps in a turn. For a linear encoder that is a way which is a whole number both of its own steps and of
-    /// units.
+    /// Native steps in a turn. A turn of a linear encoder is a length that is a whole number both of native steps and
+    /// of units.
     #[must_use]
     pub fn turn(&self) -> NonZeroU32 {
         self.turn
@@ -146,29 +147,29 @@ impl Scale {
         self.range
     }
 
-    /// Counts the other way.
+    /// Whether the scale counts the other way.
     #[must_use]
     pub fn is_reversed(&self) -> bool {
         self.reversed
     }
 
-    /// Whether both count in the same units.
+    /// Whether both scales count in the same units.
     #[must_use]
     pub fn is_like(&self, other: &Scale) -> bool {
         (self.turn, self.units, self.range) == (other.turn, other.units, other.range)
     }
 
-    /// The shaft as counted: as it is, or seen from its other end.
+    /// The position of the shaft in counting direction: unchanged, or as seen from the other end of the shaft.
     #[must_use]
-    pub fn seen(&self, shaft: Shaft) -> Shaft {
+    pub fn seen(&self, shaft: ShaftPosition) -> ShaftPosition {
         if !self.reversed {
             return shaft;
         }
         let step = (self.turn.get() - 1).saturating_sub(shaft.step);
-        Shaft { turns: (-1_i64).saturating_sub(shaft.turns), step }
+        ShaftPosition { turns: (-1_i64).saturating_sub(shaft.turns), step }
     }
 
-    /// Units from the start of a turn to a step in it, modulo the range.
+    /// Units from the start of a turn to a step within the turn, modulo the range.
     #[must_use]
     pub fn within(&self, step: u32) -> u32 {
         let units = self.within.of(step);
@@ -178,11 +179,11 @@ impl Scale {
         }
     }
 
-    /// Position at the start of a turn as counted, moved by an offset.
+    /// Position at the start of a turn, in counting direction, moved by an offset.
     #[must_use]
     #[inline(never)]
     pub fn start(&self, turns: i64, offset: i32) -> u32 {
-        // Both factors are below 2^32, and so is what is added: the sum stays below 2^64.
+        // Both factors are below 2^32, and so is the summand: the sum stays below 2^64.
         let units = self.modulo(turns) * u64::from(self.units) + self.modulo(offset.into());
         low_word(units % self.range)
     }
@@ -201,17 +202,18 @@ impl Scale {
         low_word(if a >= b { a - b } else { a + self.range.get() - b })
     }
 
-    /// The position value: with two divisions, so for what is rare; see [`Position`](super::Position).
+    /// The position value, computed with two divisions; [`Position`](super::Position) computes it faster for every
+    /// sample.
     #[must_use]
-    pub fn value(&self, shaft: Shaft, offset: i32) -> u32 {
+    pub fn value(&self, shaft: ShaftPosition, offset: i32) -> u32 {
         let seen = self.seen(shaft);
         self.add(self.start(seen.turns, offset), self.within(seen.step))
     }
 
-    /// The offset (6509h) that makes the position value `preset` here, the one nearest to zero; `None` for a preset
-    /// outside of the range.
+    /// The offset (6509h) that makes the position value `preset` at this place of the shaft; of the possible offsets,
+    /// the one nearest to zero. `None` for a preset outside of the range.
     #[must_use]
-    pub fn offset_for(&self, preset: u32, shaft: Shaft) -> Option<i32> {
+    pub fn offset_for(&self, preset: u32, shaft: ShaftPosition) -> Option<i32> {
         let range = self.range.get();
         let offset =
             u64::from(preset).lt(&range).then(|| u64::from(self.subtract(preset, self.value(shaft, 0))))?;
@@ -229,8 +231,8 @@ impl Scale {
     }
 }
 
-/// Units and steps in the turn of a way: the ratio of a step to a unit in lowest terms, times as much as fits. `None`
-/// where even the lowest terms do not.
+/// Units and steps in the turn of a linear scale: the ratio of a step to a unit in lowest terms, multiplied as far as
+/// 32 bits allow. `None` if even the lowest terms do not fit.
 fn way(step: NonZeroU64, unit: NonZeroU64) -> Option<(u32, NonZeroU32)> {
     let common = common_divisor(step, unit);
     let units = u32::try_from(step.get() / common).ok()?;
@@ -247,7 +249,7 @@ fn common_divisor(a: NonZeroU64, b: NonZeroU64) -> NonZeroU64 {
     a
 }
 
-/// The value of a remainder of a range, which is at most 2^32.
+/// Converts the remainder of a division by a range, which is at most 2^32.
 #[allow(clippy::cast_possible_truncation)]
 fn low_word(remainder: u64) -> u32 {
     remainder as u32

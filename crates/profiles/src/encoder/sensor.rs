@@ -1,4 +1,4 @@
-//! The sensor of a channel: encoder types (1000h) and what they resolve (6501h, 6502h).
+//! The sensor of a channel: encoder types (1000h) and their resolutions (6501h, 6502h).
 
 use core::num::{NonZeroU16, NonZeroU32, NonZeroU64};
 
@@ -9,8 +9,8 @@ const COUNTER_BITS: u32 = 16;
 
 /// The type of an encoder with one sensor: the codes 1 to 9 of object 1000h.
 ///
-/// The type decides where the position comes from: absolute ones are read over SSI, incremental ones are counted by a
-/// timer. Those "with electronic counting" keep their count through a loss of power.
+/// The type decides the source of the position: absolute encoders are read over SSI, incremental encoders are counted
+/// by a timer. Types "with electronic counting" keep their count through a loss of power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorType {
     /// Absolute rotary, single-turn.
@@ -34,7 +34,7 @@ pub enum SensorType {
 }
 
 impl SensorType {
-    /// By its code.
+    /// The type with this code.
     #[must_use]
     pub fn from_code(code: u8) -> Option<SensorType> {
         Some(match code {
@@ -51,19 +51,19 @@ impl SensorType {
         })
     }
 
-    /// Its code.
+    /// The code of the type.
     #[must_use]
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// A rod, not a shaft.
+    /// Whether the encoder is linear, not rotary.
     #[must_use]
     pub fn is_linear(self) -> bool {
         self.code() >= SensorType::LinearIncremental.code()
     }
 
-    /// Read over SSI, not counted.
+    /// Whether the encoder is read over SSI, not counted.
     #[must_use]
     pub fn is_absolute(self) -> bool {
         !matches!(
@@ -75,16 +75,17 @@ impl SensorType {
         )
     }
 
-    /// Counts turns or steps that its readings do not tell: nothing but a memory knows its position after a loss of power.
+    /// Whether the type counts turns or steps that its readings do not show, so that after a loss of power only
+    /// retained memory tells its position.
     #[must_use]
     pub fn is_counted(self) -> bool {
-        self.is_kept() && self != SensorType::MultiTurn
+        self.is_retained() && self != SensorType::MultiTurn
     }
 
-    /// Goes on after a loss of power where it was. A multi-turn encoder does too: the range (6002h) need not be a part
-    /// of what it can tell apart, so how often that has wrapped matters.
+    /// Whether the type continues from its last position after a loss of power. A multi-turn encoder does too: the
+    /// range (6002h) need not divide the number of its positions, so the number of wraps matters.
     #[must_use]
-    pub fn is_kept(self) -> bool {
+    pub fn is_retained(self) -> bool {
         matches!(
             self,
             SensorType::MultiTurn
@@ -101,9 +102,9 @@ impl SensorType {
 pub struct Sensor {
     /// Type.
     pub kind: SensorType,
-    /// Incremental: steps per revolution, four a line. Linear: nm a step. An absolute rotary encoder has it in its format.
+    /// Incremental: steps per revolution, four a line. Linear: nm a step. Absolute rotary: in the format instead.
     pub resolution: NonZeroU32,
-    /// Revolutions (types 3 and 5) or periods of the code (type 9) that the electronic count tells apart.
+    /// Revolutions (types 3 and 5) or periods of the code (type 9) that the electronic count distinguishes.
     pub counted: NonZeroU16,
     /// Frame of an absolute encoder.
     pub format: Format,
@@ -114,14 +115,14 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Whether readings of both mean the same, so that a position goes on from one to the other.
+    /// Whether readings of both sensors mean the same, so that a position can continue from one to the other.
     #[must_use]
     pub fn is_like(&self, other: &Sensor) -> bool {
         let is_same_code = !self.kind.is_absolute() || self.format == other.format;
         self.kind == other.kind && self.resolution() == other.resolution() && is_same_code
     }
 
-    /// What it resolves.
+    /// The resolution of the sensor.
     #[must_use]
     #[inline(never)]
     pub fn native(&self) -> Native {
@@ -150,7 +151,7 @@ impl Sensor {
         }
     }
 
-    /// Bits of the counter or code that wraps.
+    /// Number of bits of the counter or code that wraps.
     #[must_use]
     pub fn bits(&self) -> u32 {
         match self.kind {
@@ -169,7 +170,8 @@ impl Sensor {
         }
     }
 
-    /// 6502h: revolutions that it tells apart. CiA 406 allows 65 536, which its UNSIGNED16 cannot hold: 65 535 then.
+    /// 6502h: revolutions that the sensor distinguishes. CiA 406 allows 65 536, which UNSIGNED16 cannot hold; the value
+    /// is then 65 535.
     #[must_use]
     pub fn revolutions(&self) -> u16 {
         match self.native() {

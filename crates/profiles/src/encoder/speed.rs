@@ -1,33 +1,35 @@
 //! Speed from positions: object 6030h.
 //!
-//! Steps divided by time between two milliseconds in which the position changed (the M/T method). The steps are exact
-//! and so is the time, to the millisecond, so one rule serves a fast shaft, which changes every millisecond, and a
-//! slow one, which changes once in many:
+//! The speed is a number of steps divided by the time between two changes of the position (the M/T method). The steps
+//! are exact, and the time is exact to the millisecond. One rule therefore serves a fast shaft, whose position changes
+//! every millisecond, and a slow one, whose position changes once in many:
 //!
-//! * The interval ends at the last change and starts 1, 2, 4 .. 128 changes before: the shortest that has 256 steps or
-//!   128 ms, but none beyond 256 ms, except the one of a single change. What it says is exact to 1 %. It is found from
-//!   the one before: it grows to twice as many changes at most, and shrinks to any.
-//! * While nothing changes, the speed is at most one step in the time since. After [`STANDSTILL`] it is 0.
+//! * The interval ends at the last change and starts 1, 2, 4 .. 128 changes before. It is the shortest with 256 steps
+//!   or 128 ms, but not beyond 256 ms, except for the interval of a single change. The result is exact to 1 %. The
+//!   search starts from the interval before, which may at most double its number of changes, or shrink to any.
+//! * While the position does not change, the speed is at most one step in the time since the last change. After
+//!   [`STANDSTILL`] it is 0.
 //!
-//! So a shaft that starts or stops shows after a few milliseconds, and one that dithers between two steps stands still.
+//! A shaft that starts or stops therefore shows after a few milliseconds, and one that dithers between two steps stands
+//! still.
 
-/// Changes that are remembered.
+/// Number of changes that are stored.
 const MARKS: u32 = 128;
-/// Steps that make an interval long enough.
+/// Steps that make an interval long enough for 1 %.
 const ENOUGH_STEPS: u32 = 256;
-/// Milliseconds that make an interval long enough.
+/// Milliseconds that make an interval long enough for 1 %.
 const ENOUGH_TIME: u32 = 128;
-/// Milliseconds beyond which an interval says what was, not what is.
+/// Milliseconds beyond which an interval is too old to describe the present speed.
 const TOO_LONG: u32 = 256;
-/// Milliseconds without a change after which the shaft stands still: slower than about one step a second is 0.
+/// Milliseconds without a change after which the speed is 0, so a speed below about one step a second reads as 0.
 pub const STANDSTILL: u32 = 1024;
 
 /// A change of the position.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
-    /// In milliseconds.
+    /// Time in milliseconds.
     time: u32,
-    /// Movement up to then.
+    /// Movement up to this time.
     count: u32,
 }
 
@@ -35,7 +37,7 @@ struct Mark {
 #[derive(Clone, Copy, Debug)]
 struct Interval {
     steps: i32,
-    /// In milliseconds.
+    /// Length in milliseconds.
     time: u32,
 }
 
@@ -45,21 +47,21 @@ impl Interval {
     }
 }
 
-/// Remembers the last 128 changes.
+/// Computes the speed from the last 128 changes.
 #[derive(Clone, Debug)]
 pub struct Speedometer {
     marks: [Mark; MARKS as usize],
     next: u32,
-    /// Changes in the present interval.
+    /// Number of changes in the present interval.
     changes: u32,
     last: Mark,
     now: u32,
-    /// Steps a millisecond.
+    /// Speed in steps per millisecond.
     rate: f32,
 }
 
 impl Speedometer {
-    /// A shaft that has stood still, with its movement counted modulo 2^32 from `count` on.
+    /// A speedometer of a shaft at rest, with its movement counted modulo 2^32 from `count`.
     #[must_use]
     pub fn new(count: u32) -> Speedometer {
         let last = Mark { time: 0, count };
@@ -67,7 +69,7 @@ impl Speedometer {
     }
 
     /// Takes the movement up to now, once a millisecond; returns steps per second.
-    #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
+    #[allow(clippy::cast_precision_loss)] // The result has 15 bits, less than 24.
     pub fn update(&mut self, count: u32) -> f32 {
         self.now = self.now.wrapping_add(1);
         let silence = self.now.wrapping_sub(self.last.time);
@@ -99,7 +101,7 @@ impl Speedometer {
         interval.steps as f32 / interval.time as f32
     }
 
-    /// The interval since that many changes before.
+    /// The interval since `changes` changes before.
     fn since(&self, changes: u32, now: Mark) -> Interval {
         let index = self.next.wrapping_sub(changes) % MARKS;
         let mark = self.marks.get(index as usize).copied().unwrap_or(self.last);
@@ -116,7 +118,7 @@ impl Speedometer {
     }
 }
 
-/// Steps per second as the value of 6030h: in units, rounded to the nearest, saturated to INTEGER16.
+/// Converts steps per second to the value of 6030h: in units, rounded to the nearest, saturated to INTEGER16.
 #[must_use]
 #[allow(clippy::cast_possible_truncation)] // `as` saturates.
 pub fn speed_value(per_second: f32, units_per_step: f32) -> i16 {
@@ -131,7 +133,7 @@ mod tests {
 
     use super::*;
 
-    /// Turns evenly from `start` on and gives the speed at every millisecond.
+    /// Turns evenly from `start` and returns the speed at every millisecond.
     fn turn(start: u32, per_second: f64, millis: i64) -> Vec<f32> {
         let mut speedometer = Speedometer::new(start);
         let at = |t: i64| (per_second * t as f64 / 1000.0).floor() as i64;
@@ -193,7 +195,7 @@ mod tests {
         assert!(back.iter().all(|speed| deviation(*speed, -400_000.0) < 0.01), "{back:?}");
     }
 
-    /// Two steps a second, then a hundred: the long pauses before say nothing about now.
+    /// Two steps a second, then a hundred: the long pauses before do not affect the present speed.
     #[test]
     fn a_slow_shaft_that_speeds_up_forgets_how_slow_it_was() {
         let mut speedometer = Speedometer::new(0);

@@ -1,13 +1,13 @@
 //! The frame of an absolute encoder with synchronous serial interface.
 //!
-//! At rest the line is high; the first clock latches the position. So the first bit that is clocked in is the rest level,
-//! then comes the word with the most significant bit first: revolutions, steps, then an alarm bit and a parity bit where
-//! the encoder has them. Then the line is low until the clock has rested for the monoflop time. The level before the
-//! word and the one after it tell an encoder from a line that is open or shorted.
+//! At rest the line is high; the first clock latches the position. The first bit that is clocked in is the rest level.
+//! The word follows with the most significant bit first: revolutions, steps, then an alarm bit and a parity bit if the
+//! encoder has them. After the word the line is low until the clock has rested for the monoflop time. The levels before
+//! and after the word distinguish an encoder from an open or shorted line.
 
 use crate::board::SsiFrame;
 
-/// How the position is coded on the line.
+/// Coding of the position on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coding {
     /// Plain binary.
@@ -19,7 +19,7 @@ pub enum Coding {
 /// The parity bit that ends the word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parity {
-    /// The encoder sends none.
+    /// No parity bit.
     None,
     /// The number of ones, parity bit included, is even.
     Even,
@@ -39,29 +39,29 @@ pub struct Format {
     head: u64,
 }
 
-/// What a good word says.
+/// Content of a valid word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     /// Revolutions and steps as one number: the steps are its low bits.
     pub position: u32,
-    /// The same as it was coded on the line.
+    /// The same number as coded on the line.
     pub code: u32,
     /// The encoder's own alarm bit.
     pub alarm: bool,
 }
 
-/// Why a frame is no position.
+/// Why a frame gives no position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The line was not high before the word or not low after it: it is open or shorted, the encoder has no power, or its
-    /// word is longer than the format says.
+    /// The line was not high before the word or not low after it. The line is open or shorted, the encoder has no
+    /// power, or its word is longer than the format says.
     NoSignal,
-    /// The parity bit does not fit: a disturbed or shorted line.
+    /// The parity bit is wrong: the line is disturbed or shorted.
     Parity,
 }
 
 impl Format {
-    /// 4096 revolutions of 8192 steps in Gray code: what most multi-turn encoders send.
+    /// 4096 revolutions of 8192 steps in Gray code: the most common format of multi-turn encoders.
     pub const COMMON: Format = Format {
         revolution_bits: 12,
         step_bits: 13,
@@ -71,7 +71,8 @@ impl Format {
         head: 1 << 25,
     };
 
-    /// A layout; `None` for no step bits, more than 31 of them (6501h is an UNSIGNED32), or more than 32 position bits.
+    /// A layout; `None` for no step bits, for more than 31 step bits (6501h is an UNSIGNED32), or for more than 32
+    /// position bits.
     #[must_use]
     pub fn new(
         revolution_bits: u8,
@@ -86,25 +87,25 @@ impl Format {
         (1..=31).contains(&step_bits).then_some(format)
     }
 
-    /// Bits on the line.
+    /// Number of bits on the line.
     #[must_use]
     pub fn length(self) -> u32 {
         self.head.trailing_zeros()
     }
 
-    /// Bits of the position within a revolution.
+    /// Number of bits of the position within a revolution.
     #[must_use]
     pub fn step_bits(self) -> u32 {
         self.step_bits.into()
     }
 
-    /// Bits of revolutions.
+    /// Number of revolution bits.
     #[must_use]
     pub fn revolution_bits(self) -> u32 {
         self.revolution_bits.into()
     }
 
-    /// Bits of the position, 32 at most.
+    /// Number of bits of the position, 32 at most.
     #[must_use]
     pub fn position_bits(self) -> u32 {
         self.revolution_bits() + self.step_bits()
@@ -150,7 +151,7 @@ fn low_word(code: u64) -> u32 {
     code as u32
 }
 
-/// Each bit is the exclusive or of all Gray bits from the top down to it.
+/// Each bit is the exclusive or of all Gray bits from the highest down to the same place.
 fn from_gray(mut code: u32) -> u32 {
     for shift in [16, 8, 4, 2, 1] {
         code ^= code >> shift;

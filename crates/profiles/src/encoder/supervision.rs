@@ -1,4 +1,4 @@
-//! Alarms, warnings and what is reported as an emergency: objects 6503h to 6506h.
+//! Alarms, warnings and fault conditions: objects 6503h to 6506h.
 
 use super::input::{SENSOR_NO_SIGNAL, SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED};
 use super::{ChannelValues, OperatingTime};
@@ -6,7 +6,7 @@ use crate::board::Board;
 
 /// Alarm bit 0: position error.
 pub const ALARM_POSITION: u16 = 1 << 0;
-/// Alarm bit 1: the commissioning diagnostic has found something.
+/// Alarm bit 1: the commissioning diagnostic has failed.
 pub const ALARM_COMMISSIONING: u16 = 1 << 1;
 /// Supported alarms (6504h).
 pub const SUPPORTED_ALARMS: u16 = ALARM_POSITION | ALARM_COMMISSIONING;
@@ -21,8 +21,8 @@ pub const WARNING_OPERATING_TIME: u16 = 1 << 3;
 pub const WARNING_BATTERY: u16 = 1 << 4;
 /// Warning bit 5: reference point not reached.
 pub const WARNING_REFERENCE: u16 = 1 << 5;
-/// Supported warnings (6506h): all but the light reserve, bit 1, which neither kind of input tells, and the battery,
-/// bit 4, which is supported on a board that measures it.
+/// Supported warnings (6506h), apart from the battery (bit 4), which is supported on boards that measure it. The light
+/// reserve (bit 1) is never supported: neither kind of input shows it.
 pub const SUPPORTED_WARNINGS: u16 =
     WARNING_FREQUENCY | WARNING_WATCHDOG | WARNING_OPERATING_TIME | WARNING_REFERENCE;
 
@@ -31,10 +31,10 @@ pub(super) fn supported_warnings(board: &Board) -> u16 {
     SUPPORTED_WARNINGS | flag(board.battery.is_some(), WARNING_BATTERY)
 }
 
-/// Milliseconds for which a supply must be out of its limits, or back, before that is believed.
+/// Milliseconds for which a supply must be out of its limits, or back within them, before the change counts.
 const DEBOUNCE: u8 = 10;
 
-/// The limits of what the board measures, and of the operating time.
+/// Limits of the board's measurements, and of the operating time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Lowest supply of the sensors in mV.
@@ -45,12 +45,12 @@ pub struct Limits {
     pub highest_current: u16,
     /// Lowest battery voltage in mV.
     pub lowest_battery: u16,
-    /// Operating time in 0.1 h from which on bit 3 of 6505h warns; 0 for none.
+    /// Operating time in 0.1 h from which bit 3 of 6505h warns; 0 for no limit.
     pub operating_time: u32,
 }
 
 impl Default for Limits {
-    /// Sensors for 5 V, a lithium cell.
+    /// For 5 V sensors and a lithium cell.
     fn default() -> Limits {
         let (lowest_supply, highest_supply) = (4500, 5500);
         Limits {
@@ -63,74 +63,76 @@ impl Default for Limits {
     }
 }
 
-/// What is wrong, for emergency messages (CiA 406, 5.3).
+/// Fault conditions for emergency messages (CiA 406, 5.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[allow(clippy::struct_excessive_bools)] // Each is a fault of its own.
+#[allow(clippy::struct_excessive_bools)] // Each field is a separate fault.
 pub struct Conditions {
     /// 2110h, input current too high.
     pub current: bool,
     /// 3110h, input voltage out of range.
     pub voltage: bool,
-    /// 5100h, hardware memory error: what was to be kept is damaged, or a memory test has failed.
+    /// 5100h, hardware memory error: the retained state is damaged, or a memory test has failed.
     pub memory: bool,
     /// A sensor does not answer.
     pub sensor_break: bool,
-    /// A sensor answers, and its position is not right.
+    /// A sensor answers, but its position is wrong.
     pub position: bool,
 }
 
 /// A condition that must last before it counts.
 #[derive(Clone, Copy, Debug, Default)]
-struct Lasting {
+struct Debounced {
     is_set: bool,
     other: u8,
 }
 
-impl Lasting {
+impl Debounced {
     fn update(&mut self, now: bool) -> bool {
         if now == self.is_set {
             self.other = 0;
         } else if self.other < DEBOUNCE - 1 {
             self.other += 1;
         } else {
-            *self = Lasting { is_set: now, other: 0 };
+            *self = Debounced { is_set: now, other: 0 };
         }
         self.is_set
     }
 }
 
-/// Milliseconds for which a position error is told, at least: whoever takes a sample now and then must not miss it.
+/// Least time in milliseconds for which a position error is reported, so that a reader that takes only some samples
+/// does not miss it.
 const SHOWN: u8 = 100;
 
-/// A condition that is told for a while.
+/// A condition that is reported for a while.
 #[derive(Clone, Copy, Debug, Default)]
-struct Held {
+struct Stretched {
     left: u8,
 }
 
-impl Held {
+impl Stretched {
     fn update(&mut self, now: bool) -> bool {
         self.left = if now { SHOWN } else { self.left.saturating_sub(1) };
         self.left > 0
     }
 }
 
-/// Everything that lasts longer than a sample.
+/// State of the supervision from sample to sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Supervision {
     alarms: u16,
-    current: Lasting,
-    voltage: Lasting,
-    battery: Lasting,
-    position: Held,
+    current: Debounced,
+    voltage: Debounced,
+    battery: Debounced,
+    position: Stretched,
     is_damaged: bool,
-    /// The operating time has reached its limit since power-on, and has not been below it after that.
+    /// The operating time has reached its limit for the first time since power-on, and the limit has not been raised
+    /// since.
     is_old: bool,
     has_been_old: bool,
 }
 
 impl Supervision {
-    /// What was to be kept may be damaged.
+    /// `is_damaged`: the retained state is damaged.
     pub(super) fn new(is_damaged: bool) -> Supervision {
         Supervision { is_damaged, ..Supervision::default() }
     }
@@ -140,7 +142,7 @@ impl Supervision {
         self.alarms &= !mask;
     }
 
-    /// Object 6503h: what is wrong now, and what was and has not been acknowledged.
+    /// Object 6503h: present alarms, and past alarms that have not been acknowledged.
     pub(super) fn alarms(&mut self, channels: &[ChannelValues; 2]) -> u16 {
         let position = sensors(channels) & SENSOR_POSITION_ERROR != 0;
         let commissioning = channels.iter().any(|channel| channel.commissioning.is_failure());
@@ -148,7 +150,7 @@ impl Supervision {
         self.alarms
     }
 
-    /// Object 6505h: what is out of tolerance now.
+    /// Object 6505h: warnings that are present now.
     pub(super) fn warnings(
         &mut self,
         channels: &[ChannelValues; 2],
@@ -185,7 +187,8 @@ impl Supervision {
         }
     }
 
-    /// The warning goes when the limit is raised, and then comes again only after power-on (CiA 406, 6505h).
+    /// The operating time warning. It goes when the limit is raised, and returns only after the next power-on (CiA 406,
+    /// 6505h).
     fn is_too_old(&mut self, limits: &Limits, time: OperatingTime) -> bool {
         let reached = limits.operating_time > 0 && time.tenths() >= limits.operating_time;
         self.is_old = reached && (self.is_old || !self.has_been_old);
@@ -194,7 +197,7 @@ impl Supervision {
     }
 }
 
-/// Whether a sensor does not answer, and whether the position of one that does is wrong.
+/// Whether a sensor does not answer, and whether a sensor answers with a wrong position.
 #[inline(never)]
 fn errors(channels: &[ChannelValues; 2]) -> (bool, bool) {
     let broken = SENSOR_NO_SIGNAL | SENSOR_POSITION_ERROR;

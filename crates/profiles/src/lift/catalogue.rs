@@ -1,39 +1,40 @@
 //! The PDOs that CiA 417-3-1 pre-defines for lift 1, as data.
 //!
-//! A TPDO of one device is an RPDO of the same number in another, so one entry describes both sides. Where the
-//! printed tables contradict each other the entry follows the reading given in a comment beside it. These hold for all:
+//! A TPDO of one device is an RPDO of the same number in another, so one entry describes both sides. Where the printed
+//! tables contradict each other, a comment beside the entry gives the interpretation. These rules apply to all entries:
 //!
-//! * TPDOs have sub-indexes up to 6 (up to 5 for number 2), RPDOs up to 5, though sub-index 0 of most RPDOs is printed
-//!   as up to 6: an RPDO has no SYNC start value and no row for it.
-//! * The number of mapped objects of many RPDOs is printed as 0 to n: it is n, as a default is one value.
-//! * The mapping of many RPDOs is printed as mandatory: it exists where the communication parameter does, as with the
-//!   others.
-//! * The CAN-IDs lie inside the pre-defined connection set of CiA 301: 181h to 18Fh are TPDO 1 of the nodes 1 to 15, 200h
-//!   to 207h RPDO 1 of the nodes up to 7, 400h RPDO 3, 480h and 500h and up TPDO 4 and RPDO 4 of any node. A lift device
-//!   has no PDOs of that set (`docs/lift.md`).
+//! * TPDOs have sub-indexes up to 6 (up to 5 for number 2), RPDOs up to 5. Sub-index 0 of most RPDOs is printed as up
+//!   to 6, but an RPDO has no SYNC start value and no row for it.
+//! * The number of mapped objects of many RPDOs is printed as 0 to n. Here it is n, as a default is one value.
+//! * The mapping of many RPDOs is printed as mandatory. Here it exists if the communication parameter exists, as with
+//!   the other RPDOs.
+//! * The CAN-IDs lie inside the pre-defined connection set of CiA 301: 181h to 18Fh are TPDO 1 of the nodes 1 to 15,
+//!   200h to 207h RPDO 1 of the nodes up to 7, 400h RPDO 3, 480h and 500h and up TPDO 4 and RPDO 4 of any node. A lift
+//!   device has no PDOs of the pre-defined connection set (`docs/lift.md`).
 //! * Misprints of single characters (an ordinal, a missing h, an event timer of two digits) are not repeated.
-//! * COB-IDs of TPDOs are printed with bit 30 set or clear. Either may be; producers here set it, for remote frames are
-//!   not to be used.
-//! * Type 255: sent on entering Operational and on each change, and with an event timer when that elapses, only. CiA 301
-//!   leaves the event to the profile, so this is what `canopen` does for that type.
+//! * COB-IDs of TPDOs are printed with bit 30 set or clear, and both are allowed. Producers here set the bit, because
+//!   remote frames should not be used.
+//! * Type 255: without an event timer, a PDO is sent on entering Operational and on each change; with an event timer,
+//!   only on entering Operational and when the timer elapses. CiA 301 leaves the event to the profile; `canopen`
+//!   implements this rule for type 255.
 
 /// One pre-defined PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pdo {
-    /// Number of the TPDO. RPDOs have the same number, but for those of [`CobId::PlusNode`].
+    /// Number of the TPDO. The RPDO has the same number, except for [`CobId::PlusNode`].
     pub number: u16,
-    /// What it carries.
+    /// Name of the content.
     pub name: &'static str,
-    /// Its identifier.
+    /// CAN-ID.
     pub cob_id: CobId,
-    /// Its content.
+    /// Mapping.
     pub content: Content,
 }
 
 /// The identifier of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CobId {
-    /// The same in every device: one producer in the lift.
+    /// The same CAN-ID in every device: the lift has one producer.
     Fixed(u16),
     /// The producer's node-ID is added. A consumer has one RPDO for each of the 127 producers.
     PlusNode(u16),
@@ -42,7 +43,7 @@ pub enum CobId {
 /// The content of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// Mapped objects in order.
+    /// Mapped objects in their order.
     Objects(&'static [Object]),
     /// A multiplexed PDO in destination address mode: index, sub-index and data travel in the frame.
     Multiplexed,
@@ -57,7 +58,7 @@ pub struct Object {
     pub sub: u8,
     /// Length in bits.
     pub bits: u8,
-    /// What it is.
+    /// Name of the object.
     pub name: &'static str,
 }
 
@@ -71,7 +72,7 @@ impl Object {
         if self.index == Self::RESERVED { Object { index: 0x0005, ..self } } else { self }
     }
 
-    /// Whether its value can be below 0: velocities and the effort of the drive, as those of CiA 402 can.
+    /// Whether the value can be negative: velocities and the effort of the drive, as in CiA 402.
     #[must_use]
     pub const fn is_signed(self) -> bool {
         matches!(self.index, 0x6406 | 0x6430 | 0x6433)
@@ -104,7 +105,7 @@ impl Pdo {
         }
     }
 
-    /// The CAN-ID that `producer` sends it with.
+    /// The CAN-ID that `producer` uses.
     #[must_use]
     pub const fn can_id(&self, producer: u8) -> u16 {
         match self.cob_id {
@@ -114,26 +115,26 @@ impl Pdo {
     }
 }
 
-/// What a frame with a pre-defined identifier is.
+/// Meaning of a frame with a pre-defined identifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Definition {
     /// The PDO.
     pub pdo: &'static Pdo,
-    /// Node-ID of its producer, where the identifier tells it.
+    /// Node-ID of the producer, if the identifier tells it.
     pub producer: Option<u8>,
 }
 
-/// A field of a PDO: where an object is in the frame.
+/// A field of a PDO: the place of an object in the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// The object, as the producer maps it.
     pub object: Object,
-    /// Its first bit; bit 0 is the lowest of the first byte.
+    /// First bit of the field; bit 0 is the lowest of the first byte.
     pub start: u8,
 }
 
 impl Definition {
-    /// The fields in order; none for a multiplexed PDO, which names its object itself ([`name_of`]).
+    /// The fields in order. A multiplexed PDO has none, because its frame names the object ([`name_of`]).
     pub fn fields(&self) -> impl Iterator<Item = Field> {
         let objects = match self.pdo.content {
             Content::Objects(objects) => objects,
@@ -148,7 +149,7 @@ impl Definition {
 }
 
 impl Field {
-    /// The value in the data of a frame; `None` for a frame that is too short for it.
+    /// The value in the data of a frame; `None` if the frame is too short.
     #[must_use]
     pub fn value(&self, data: &[u8]) -> Option<u64> {
         let first = usize::from(self.start / 8);
@@ -157,7 +158,7 @@ impl Field {
     }
 }
 
-/// What the frames with a COB-ID are; its flags do not matter. `None` for one that is not pre-defined.
+/// Meaning of the frames with a COB-ID, whose bits 30 and 31 are ignored. `None` if the COB-ID is not pre-defined.
 #[must_use]
 pub fn by_cob_id(cob_id: u32) -> Option<Definition> {
     let id = u16::try_from(cob_id & 0x3FFF_FFFF).ok()?;
@@ -187,7 +188,7 @@ pub const fn by_number(number: u16) -> Option<&'static Pdo> {
     None
 }
 
-/// What an object is that one of the PDOs carries.
+/// Name of an object that one of the PDOs carries.
 #[must_use]
 pub fn name_of(index: u16, sub: u8) -> Option<&'static str> {
     let mapped = PDOS.iter().filter_map(|pdo| match pdo.content {
@@ -208,12 +209,13 @@ const fn object(index: u16, sub: u8, bits: u8, name: &'static str) -> Object {
 
 const RESERVED: Object = object(Object::RESERVED, 0, 8, "reserved");
 
-/// All of them, by number. Number 266 is left out of the profile: a gap between door control and the first door.
+/// All PDOs, by number. The profile skips number 266, between door control and the first door.
 pub const PDOS: &[Pdo; 19] = &[
     // The index ranges are printed one too long (to 1480h and 1680h): 127 producers need 1401h to 147Fh, and 1480h
-    // belongs to RPDO 129. There is no SYNC start value in 1801h: as printed, unlike in the other TPDOs.
+    // belongs to RPDO 129. 1801h has no SYNC start value, as printed, unlike the other TPDOs.
     Pdo { number: 2, name: "multiplexed PDO", cob_id: CobId::PlusNode(0x500), content: Content::Multiplexed },
-    // The consumer's table maps 6011h, which is the virtual output; the producer maps the input, 6010h.
+    // The consumer's table maps 6011h, the virtual output; the producer's table maps the input, 6010h, which is used
+    // here.
     Pdo {
         number: 130,
         name: "virtual input",
@@ -221,8 +223,8 @@ pub const PDOS: &[Pdo; 19] = &[
         content: Content::Objects(&[object(0x6010, 0, 48, "virtual input")]),
     },
     fixed(257, "virtual output", 0x400, &[object(0x6011, 0, 48, "virtual output")]),
-    // The consumer's mapping is printed at 1501h, which is its own communication parameter: it is at 1701h, and each of
-    // the two exists where the other does. The second entry is printed as sub-index 1 again; two are mapped, so it is 2.
+    // The consumer's mapping is printed at 1501h, the index of its communication parameter. It is at 1701h, and each of
+    // the two exists if the other does. The second entry is printed as sub-index 1 again. Two are mapped, so it is 2.
     fixed(
         258,
         "load measuring unit",
@@ -251,8 +253,8 @@ pub const PDOS: &[Pdo; 19] = &[
             object(0x6433, 0, 32, "actual velocity"),
         ],
     ),
-    // 180h is a restricted identifier of CiA 301 that this profile uses all the same. The consumer's table prints
-    // 6432h where the producer has 6423h; both call it the profile velocity.
+    // 180h is a restricted identifier of CiA 301, but this profile uses it. The consumer's table prints 6432h where the
+    // producer has 6423h; both call it the profile velocity.
     fixed(
         261,
         "car drive, position command",
@@ -262,8 +264,8 @@ pub const PDOS: &[Pdo; 19] = &[
     fixed(262, "car drive, control effort", 0x181, &[object(0x6406, 0, 32, "control effort")]),
     fixed(263, "car position 1", 0x18C, &[object(0x6383, 1, 32, "position 1")]),
     fixed(264, "car position 2", 0x18D, &[object(0x6383, 2, 32, "position 2")]),
-    // Four doors are controlled, three report: the profile has no status PDO for the fourth. A consumer maps the
-    // dummy object 0006h (UNSIGNED16) for a door it does not have.
+    // Four doors are controlled and three report: the profile has no status PDO for the fourth. A consumer maps the
+    // dummy object 0006h (UNSIGNED16) in place of a door that it does not have.
     fixed(
         265,
         "car door control",

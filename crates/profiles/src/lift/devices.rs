@@ -1,6 +1,6 @@
-//! Which virtual devices a node is. One object (2305h) chooses them; a node as delivered is none.
+//! The virtual devices of a node. One object (2305h) chooses them; a node as delivered has none.
 
-/// Virtual devices, a bit for each.
+/// A set of virtual devices, one bit for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Devices(pub u8);
 
@@ -13,21 +13,21 @@ impl Devices {
     pub const INPUT_PANEL: Devices = Devices(1 << 2);
     /// An output panel unit.
     pub const OUTPUT_PANEL: Devices = Devices(1 << 3);
-    /// How many there are to choose from.
+    /// Number of kinds of virtual devices.
     pub const KINDS: usize = 4;
-    /// All of them.
+    /// All kinds.
     pub const ALL: Devices = Devices((1 << Devices::KINDS) - 1);
 
-    /// Whether this one is chosen.
+    /// Whether `device` is in the set.
     #[must_use]
     pub const fn has(self, device: Devices) -> bool {
         self.0 & device.0 == device.0
     }
 
-    /// Their types as 6000h lists them, in the order of their bits, and how many there are; 0 behind the last. A type is what bits 16
-    /// to 31 of 1000h are in a device that is one of them only.
+    /// The types as listed in 6000h, in the order of the bits and followed by zeros, and their number. The type equals
+    /// bits 16 to 31 of 1000h in a device with one virtual device only.
     #[must_use]
-    #[inline(never)] // This crate is compiled for speed, and a choice is in no hurry.
+    #[inline(never)] // This crate is compiled for speed, and the choice is not urgent.
     pub fn types(self) -> ([u16; Devices::KINDS], usize) {
         let (mut types, mut count) = ([0; Devices::KINDS], 0);
         for (bit, code) in [0x0600, 0x0A00, 0x0200, 0x0300].into_iter().enumerate() {
@@ -39,7 +39,7 @@ impl Devices {
         (types, count)
     }
 
-    /// Device type (1000h): the virtual device that the node is, or 0 in the upper half for several or none.
+    /// Device type (1000h): the type of the only virtual device in the upper half, or 0 for several or none.
     #[must_use]
     pub fn device_type(self) -> u32 {
         let ([first, ..], count) = self.types();

@@ -4,22 +4,22 @@
 //! RawSample ─ ratio ─ Pa (transducer) ─ filter ─ kg (two points) ─ + zero offset ─ 6480h ─ limits (6483h) ─ 6482h
 //! ```
 //!
-//! Two pressures and the loads that they stand for make the calibration: of the cylinder of a hydraulic lift, or, for a
-//! load cell whose amplifier is on the same input, of the signal that the input takes for a pressure.
+//! The calibration consists of two pressures and their loads. For a hydraulic lift these are pressures of the cylinder;
+//! for a load cell whose amplifier is on the same input, they are the signals that the input takes for pressures.
 //!
-//! # Where CiA 417 is not public
+//! # Interpretation where CiA 417 is not public
 //!
-//! The layout of PDO 258 is; what its objects mean is known from products only. These readings are made here and nowhere
-//! else:
+//! The layout of PDO 258 is public; the meaning of its objects is known from products only. These interpretations are
+//! made in this module alone:
 //!
 //! * The load (6480h) is in kg, from 0 to 65535.
 //! * The signals (6482h) are zero, half, full and overload, in bits 0 to 3, with the limits 6483h:1 to 4 in the same
 //!   order. A limit of 0 switches its bit off.
-//! * Zero is signalled below its limit, the others above theirs; where the first limit that is on is the highest,
-//!   everything is the other way round.
-//! * The reference weight (6486h) is the load in the car at the moment when it is written.
-//! * A sensor that is broken gives the highest load there is: a car that cannot be weighed does not leave. That holds until the
-//!   filter is full of samples of an intact sensor.
+//! * Zero is signalled below its limit, the others above their limits. If the first limit in use is higher than the
+//!   last, all signals are inverted.
+//! * The reference weight (6486h) is the load in the car at the moment of the write.
+//! * A broken sensor gives the highest possible load, because a car that cannot be weighed must not leave. This load is
+//!   kept until the filter is full of samples of an intact sensor.
 
 use crate::board::{ChipThermometer, RawSample};
 use crate::pressure::{Calibration, Filter, Recovery};
@@ -33,12 +33,12 @@ pub const FULL_LOAD: u8 = 1 << 2;
 /// Load signal (6482h): overload.
 pub const OVERLOAD: u8 = 1 << 3;
 
-/// A pressure and the load that it stands for.
+/// A pressure and its load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// In Pa.
+    /// Pressure in Pa.
     pub pressure: f32,
-    /// In kg.
+    /// Load in kg.
     pub load: f32,
 }
 
@@ -47,11 +47,11 @@ pub struct Point {
 pub struct Parameters {
     /// Characteristic of the transducer.
     pub transducer: Calibration,
-    /// As 61A0h of CiA 404.
+    /// Filter type, with the codes of 61A0h of CiA 404.
     pub filter_type: u8,
-    /// As 61A1h of CiA 404.
+    /// Filter constant, as in 61A1h of CiA 404.
     pub filter_constant: u8,
-    /// Two different pressures; with two equal ones there is no load measuring unit.
+    /// Two different pressures; with two equal ones the load measuring unit is off.
     pub points: [Point; 2],
     /// Added to the load in kg.
     pub offset: f32,
@@ -60,7 +60,7 @@ pub struct Parameters {
 }
 
 impl Default for Parameters {
-    /// 10 bar are 1000 kg; the mean of 100 samples; no limits.
+    /// 10 bar are 1000 kg; mean of 100 samples; no limits.
     fn default() -> Parameters {
         Parameters {
             transducer: Calibration::default(),
@@ -74,13 +74,13 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Whether there is a load measuring unit.
+    /// Whether the load measuring unit is calibrated, which switches it on.
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
         self.line().is_some()
     }
 
-    /// The load in kg at a pressure is `factor * pressure + constant`.
+    /// Factor and constant of the load in kg: `factor * pressure + constant`.
     fn line(&self) -> Option<(f32, f32)> {
         let [a, b] = self.points;
         let factor = (b.load - a.load) / (b.pressure - a.pressure);
@@ -88,16 +88,16 @@ impl Parameters {
     }
 }
 
-/// What the load measuring unit gives for one sample.
+/// Output of the load measuring unit for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Load (6480h) in kg.
     pub load: u16,
     /// Signals (6482h).
     pub signals: u8,
-    /// The load in kg as it is measured, below 0 too.
+    /// The measured load in kg, negative values included.
     pub measured: f32,
-    /// The offset that is in it.
+    /// The offset that `measured` includes.
     pub offset: f32,
     /// The sensor or its wiring is broken.
     pub is_broken: bool,
@@ -116,14 +116,15 @@ pub struct LoadUnit {
 impl LoadUnit {
     /// A unit that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
-    #[inline(never)] // Called once, from several places.
+    #[inline(never)] // Several callers, of which one runs.
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> LoadUnit {
         let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
         let recovery = Recovery::default();
         LoadUnit { chip, parameters: *parameters, line: parameters.line(), filter, recovery }
     }
 
-    /// Takes over parameters, from the next sample on. The filter only starts afresh when it is another one.
+    /// Takes over parameters; they act from the next sample on. The filter restarts only if its own parameters have
+    /// changed.
     #[inline(never)]
     pub fn apply(&mut self, parameters: &Parameters) {
         let fresh = LoadUnit::new(self.chip, parameters);
@@ -155,13 +156,13 @@ impl LoadUnit {
     }
 }
 
-/// To the nearest kg, 0 below 0.
+/// Rounds to the nearest kg; a negative load gives 0.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `as` saturates.
 fn rounded(load: f32) -> u16 {
     (load + 0.5) as u16
 }
 
-/// Object 6482h at a load.
+/// Object 6482h for a load.
 #[must_use]
 pub fn signals(load: u16, limits: &[u16; 4]) -> u8 {
     let mut used = limits.iter().filter(|limit| **limit != 0);
@@ -265,7 +266,8 @@ mod tests {
         assert_eq!(unit.sample(&raw(2.0e5)).load, 0);
     }
 
-    /// No load that is too small and no signal of it, whatever the sample says in which the fault ends.
+    /// The first load after a fault is neither too small nor signalled as such, whatever the last faulty sample
+    /// contains.
     #[test]
     fn after_a_fault_the_first_load_is_the_right_one() {
         for (kind, constant) in [(0, 1), (1, 20), (2, 100)] {

@@ -1,8 +1,8 @@
 //! The lift application profile, CiA 417: lift 1.
 //!
-//! A device is several virtual devices in one: here up to four car position units ([`position`]), a load measuring unit
-//! ([`load`]), and a panel with two buttons and two lamps ([`panel`]). [`catalogue`] knows what all virtual devices of a
-//! lift send each other.
+//! A device consists of several virtual devices: here up to four car position units ([`position`]), a load measuring
+//! unit ([`load`]), and a panel with two buttons and two lamps ([`panel`]). [`catalogue`] describes the PDOs that the
+//! virtual devices of a lift exchange.
 
 pub mod catalogue;
 pub mod devices;
@@ -22,22 +22,22 @@ use devices::Devices;
 /// All parameters of the virtual devices.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parameters {
-    /// Of the car position units.
+    /// Parameters of the car position units.
     pub position: position::Parameters,
-    /// Of the load measuring unit.
+    /// Parameters of the load measuring unit.
     pub load: load::Parameters,
-    /// The virtual devices that the node is.
+    /// The virtual devices of the node.
     pub devices: Devices,
 }
 
-/// What the virtual devices give for one sample.
+/// Output of the virtual devices for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Snapshot {
-    /// Of the car position units.
+    /// Output of the car position units.
     pub position: position::Snapshot,
-    /// Of the load measuring unit.
+    /// Output of the load measuring unit.
     pub load: load::Snapshot,
-    /// The virtual devices that the node is: what the others measure is of no interest.
+    /// The virtual devices of the node; the outputs of other virtual devices are ignored.
     pub devices: Devices,
     /// Which buttons are pressed.
     pub buttons: [bool; panel::BUTTONS],
@@ -55,7 +55,7 @@ impl Chain for Lift {
     type Parameters = Parameters;
     type Snapshot = Snapshot;
 
-    // Made in its place: what the compiler makes of it where it is called is three times as long.
+    // Not inlined: inlined into its caller, the code is three times as long.
     #[inline(never)]
     fn new(power_on: &PowerOn) -> Lift {
         Lift {

@@ -1,6 +1,7 @@
 //! Input and output panel units: two buttons and two lamps.
 //!
-//! What a button tells is an event: a call that is not told is lost for ever. So each change waits here until the bus takes it.
+//! Each change of a button is an event, and a call that is not sent is lost. Changes therefore wait here until the bus
+//! takes them.
 
 use crate::board::{DIGITAL_INPUTS, DIGITAL_OUTPUTS};
 use heapless::Deque;
@@ -9,34 +10,34 @@ use heapless::Deque;
 pub const BUTTONS: usize = DIGITAL_INPUTS;
 /// Lamps of a panel.
 pub const LAMPS: usize = DIGITAL_OUTPUTS;
-/// Changes that can wait: a button that is pressed ten times a second fills the queue in more than a second.
+/// Number of changes that can wait: a button pressed ten times a second fills the queue in more than a second.
 const WAITING: usize = 32;
 
-/// A button and what has happened to it.
+/// A button and its new state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Contact {
-    /// Which one, from 0.
+    /// Number of the button, from 0.
     pub button: u8,
     /// Whether it is pressed.
     pub is_pressed: bool,
 }
 
-/// What is to be told of the buttons: changes in their order, and then states that somebody wants to know.
+/// Calls to be sent: changes of the buttons in their order, then the states that were asked for.
 ///
-/// When more changes wait than there is room for, the newest are left out, and the states of all buttons follow behind
-/// those that wait.
+/// If the queue is full, the newest changes are dropped, and the states of all buttons follow after the waiting
+/// changes.
 #[derive(Debug, Default)]
 pub struct Calls {
     pressed: [bool; BUTTONS],
     changes: Deque<Contact, WAITING>,
-    /// A change was left out.
+    /// A change was dropped.
     has_lost: bool,
-    /// The buttons whose states are to be told.
+    /// The buttons whose states are to be sent.
     asked: [bool; BUTTONS],
 }
 
 impl Calls {
-    /// Takes which buttons are pressed, debounced.
+    /// Takes the debounced state of the buttons.
     pub fn observe(&mut self, pressed: [bool; BUTTONS]) {
         for (button, (before, now)) in (0..).zip(self.pressed.iter_mut().zip(pressed)) {
             if core::mem::replace(before, now) != now {
@@ -46,20 +47,20 @@ impl Calls {
         }
     }
 
-    /// Forgets what has happened: the states of all buttons are to be told.
+    /// Forgets all changes; the states of all buttons are to be sent.
     pub fn begin(&mut self) {
         self.changes.clear();
         (self.has_lost, self.asked) = (false, [true; BUTTONS]);
     }
 
-    /// The state of this button is to be told.
+    /// Asks for the state of this button to be sent.
     pub fn ask(&mut self, button: usize) {
         if let Some(asked) = self.asked.get_mut(button) {
             *asked = true;
         }
     }
 
-    /// What to tell next.
+    /// The next call to be sent.
     #[inline(never)]
     pub fn take_next(&mut self) -> Option<Contact> {
         if let Some(change) = self.changes.pop_front() {

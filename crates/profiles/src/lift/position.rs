@@ -1,47 +1,47 @@
 //! The car position unit: up to four positions along the shaft, from the two channels of the encoder.
 //!
-//! The encoder counts the way that its sensor has gone in measuring steps (6384h:1); a position unit adds its offset and
-//! its direction. A preset only finds the offset, so it is a parameter like any other:
+//! The encoder counts the travel of its sensor in measuring steps (6384h:1). A position unit adds its offset and its
+//! direction. A preset only changes the offset, so the offset is a parameter like any other:
 //!
 //! ```text
-//! position (6383h) = ± way + offset, modulo all that the sensor tells apart
+//! position (6383h) = ± travel + offset, modulo all positions that the sensor distinguishes
 //! ```
 //!
-//! Positions are unsigned as those of CiA 406 are, and go round at the ends: a preset puts the whole way of the car above 0.
+//! Positions are unsigned and wrap, as in CiA 406. A preset places the whole travel of the car above 0.
 
 use crate::board::{RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{
-    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, SENSOR_HELD,
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Module, RetainedState, SENSOR_HELD,
     SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_POSITION_ERROR, Sensor, Start, area_state,
 };
 
-/// Position units that a device can be.
+/// Number of position units in a device.
 pub const UNITS: usize = 4;
 
 /// Operating parameter (6380h): the position falls when the sensor counts up.
 pub const INVERTED: u16 = 1 << 3;
 
-/// State of a position unit: the sensor does not give a position.
+/// State of a position unit: the sensor gives no position.
 pub const UNKNOWN: u8 = 1 << 3;
 
-/// State of a position unit: not referenced. The position is not to be trusted before a preset, or an index that says where the
-/// sensor is.
+/// State of a position unit: not referenced. The position must not be trusted before a preset, or before an index that
+/// determines the position.
 pub const NOT_REFERENCED: u8 = 1 << 4;
 
-/// Which channel of the encoder a position unit measures with.
+/// The encoder channel of a position unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The first.
+    /// Channel 1.
     First,
-    /// The second.
+    /// Channel 2.
     Second,
 }
 
 impl Source {
-    /// By the number of the channel.
+    /// The source with this channel number.
     #[must_use]
     pub fn from_code(code: u8) -> Option<Source> {
         match code {
@@ -62,22 +62,22 @@ impl Source {
 /// The parameters of one position unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnitParameters {
-    /// `None` for a unit that is not there.
+    /// `None` for an unused unit.
     pub source: Option<Source>,
     /// Operating parameters (6380h): [`INVERTED`].
     pub operating: u16,
-    /// From the way to the position, in measuring steps.
+    /// Difference between position and travel, in measuring steps.
     pub offset: i32,
-    /// Limits of the position (63B4h, 63B8h), compared as those of the work area of CiA 406 are.
+    /// Limits of the position (63B4h, 63B8h), compared like the work area of CiA 406.
     pub limits: Area,
 }
 
 /// The parameters of the position units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameters {
-    /// The sensors and the limits of what the board measures. What else is there belongs to CiA 406 and is not used.
+    /// The sensors, and the limits of the board's measurements. The other fields belong to CiA 406 and are not used.
     pub sensors: encoder::Parameters,
-    /// Way of the car in a revolution of a rotary sensor, in um.
+    /// Travel of the car per revolution of a rotary sensor, in um.
     pub travel: NonZeroU32,
     /// Position measuring step (6384h:1) in 10 um.
     pub position_step: NonZeroU16,
@@ -88,14 +88,14 @@ pub struct Parameters {
 }
 
 impl Default for UnitParameters {
-    /// Not there.
+    /// An unused unit.
     fn default() -> UnitParameters {
         UnitParameters { source: None, operating: 0, offset: 0, limits: Area { low: 0, high: i32::MAX } }
     }
 }
 
 impl Default for Parameters {
-    /// Unit 1 with the first channel; 1 mm, 1 mm/s and 200 mm in a revolution.
+    /// Unit 1 with the first channel; 1 mm, 1 mm/s, and 200 mm per revolution.
     fn default() -> Parameters {
         let mut units = [UnitParameters::default(); UNITS];
         let [first, ..] = &mut units;
@@ -117,8 +117,8 @@ impl Parameters {
         self.encoder().is_consistent()
     }
 
-    /// The offset that makes the position of a unit `preset` where it is `position` now; `None` for a unit without a
-    /// sensor and for a preset beyond what the sensor tells apart.
+    /// The offset that makes the position of a unit `preset` when the position is `position` now. `None` for a unit
+    /// without a sensor, and for a preset beyond the range of the sensor.
     #[must_use]
     pub fn preset(&self, unit: usize, position: u32, preset: u32) -> Option<i32> {
         let range = self.range(unit)?;
@@ -127,15 +127,15 @@ impl Parameters {
         (i64::from(preset) < range).then(|| folded(i64::from(own.offset) + moved, range))
     }
 
-    /// The offset that leaves the position of a unit as it is when it counts the other way from now on.
+    /// The offset that keeps the position of a unit when its direction is reversed.
     #[must_use]
     pub fn turned(&self, unit: usize, position: u32) -> Option<i32> {
         let (range, own) = (self.range(unit)?, self.units.get(unit)?);
-        // position = ± way + old offset = ∓ way + new offset.
+        // position = ± travel + old offset = ∓ travel + new offset.
         Some(folded(2 * i64::from(position) - i64::from(own.offset), range))
     }
 
-    /// The number of different positions of a unit.
+    /// Number of different positions of a unit.
     fn range(&self, unit: usize) -> Option<i64> {
         let parameters = self.encoder();
         let source = self.units.get(unit)?.source?;
@@ -143,7 +143,7 @@ impl Parameters {
         i64::try_from(parameters.scale(&sensor).range().get()).ok()
     }
 
-    /// What the encoder gets: both channels count the way.
+    /// The parameters for the encoder: both channels count travel.
     #[inline(never)]
     fn encoder(&self) -> encoder::Parameters {
         let channel = |own: ChannelParameters| ChannelParameters {
@@ -157,7 +157,7 @@ impl Parameters {
         encoder::Parameters {
             operating: 0,
             travel: Some(self.travel),
-            // In nm and in 0.01 mm/s.
+            // Steps in nm and in 0.01 mm/s.
             step: u32::from(self.position_step.get()) * 10_000,
             speed_step: u32::from(self.speed_step.get()) * 10,
             channels: self.sensors.channels.map(channel),
@@ -167,39 +167,40 @@ impl Parameters {
     }
 }
 
-/// What a position unit gives for one sample.
+/// Output of a position unit for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UnitValues {
     /// Position (6383h) in measuring steps.
     pub position: u32,
-    /// The offset that is in it.
+    /// The offset that `position` includes.
     pub offset: i32,
     /// Speed (6390h) in speed measuring steps.
     pub speed: i16,
-    /// Where the readings of the sensor are: the position, but for readings that are not believed.
+    /// The position by the readings of the sensor: equal to the position unless the readings are rejected as
+    /// implausible.
     pub reading: u32,
-    /// [`UNKNOWN`], [`NOT_REFERENCED`], and whether the position is beyond a limit: bits of the area state of CiA 406.
+    /// [`UNKNOWN`], [`NOT_REFERENCED`], and the bits of the area state of CiA 406 for a position beyond a limit.
     pub state: u8,
     /// Operating status (63C0h).
     pub operating_status: u16,
     /// Resolution (63C1h) of the sensor: steps per revolution, or nm a step.
     pub resolution: u32,
-    /// Revolutions (63C2h) that the sensor tells apart.
+    /// Revolutions (63C2h) that the sensor distinguishes.
     pub revolutions: u32,
-    /// Warnings (63C5h): those of CiA 406. What they say holds for both sensors.
+    /// Warnings (63C5h), the same as in CiA 406. They concern both sensors together.
     pub warnings: u16,
 }
 
-/// What the position units give for one sample.
+/// Output of the position units for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
     /// The units.
     pub units: [UnitValues; UNITS],
-    /// What is reported as an emergency.
+    /// The faults to be reported as emergencies.
     pub conditions: Conditions,
 }
 
-/// A unit at work.
+/// A unit in use.
 #[derive(Clone, Copy, Debug)]
 struct Unit {
     source: Source,
@@ -207,7 +208,7 @@ struct Unit {
     offset: i32,
     range: i64,
     limits: Area,
-    /// What depends on parameters alone.
+    /// The part of the values that depends on parameters alone.
     fixed: UnitValues,
 }
 
@@ -253,18 +254,19 @@ fn known(channel: &ChannelValues) -> u8 {
     unknown | if is_wrong { NOT_REFERENCED } else { 0 }
 }
 
-/// 63C0h: scaling (bit 2) is always on. What is public shows the direction in bit 0, 6380h has it in bit 3: both.
+/// 63C0h: scaling (bit 2) is always on. The public text shows the direction in bit 0, 6380h has it in bit 3, so both
+/// bits are set.
 fn operating_status(is_inverted: bool) -> u16 {
     encoder::SCALING | if is_inverted { INVERTED | encoder::CODE_SEQUENCE } else { 0 }
 }
 
-/// A position modulo the range, which is 2^32 at most.
+/// A position modulo the range, which is at most 2^32.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn wrapped(position: i64, range: i64) -> u32 {
     position.checked_rem_euclid(range).unwrap_or(0) as u32
 }
 
-/// The offset nearest to zero that is the same modulo the range.
+/// The equivalent offset (modulo the range) that is nearest to zero.
 #[allow(clippy::cast_possible_truncation)]
 fn folded(offset: i64, range: i64) -> i32 {
     let offset = i64::from(wrapped(offset, range));
@@ -285,13 +287,13 @@ impl Default for PositionUnits {
 }
 
 impl PositionUnits {
-    /// The units after power-on. They measure from the first parameters on.
+    /// The units after power-on. Measuring begins with the first parameters.
     #[must_use]
     pub fn new(start: Start) -> PositionUnits {
         PositionUnits { encoder: Encoder::new(start), units: [None; UNITS] }
     }
 
-    /// Takes over parameters, from the next sample on.
+    /// Takes over parameters; they act from the next sample on.
     #[inline(never)]
     pub fn apply(&mut self, parameters: &Parameters) {
         let encoder = parameters.encoder();
@@ -302,7 +304,7 @@ impl PositionUnits {
         }
     }
 
-    /// Processes what was read in one millisecond.
+    /// Processes the readings of one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
         let encoder::Snapshot { channels, warnings, conditions, .. } = self.encoder.sample(raw);
         let values =
@@ -310,14 +312,14 @@ impl PositionUnits {
         Snapshot { units: self.units.map(values), conditions }
     }
 
-    /// The same in its stored form, in its place.
+    /// Writes the retained state to `words`, in its stored form.
     pub(super) fn retain(&self, words: &mut [u32; RETAINED_WORDS]) {
         self.encoder.retain_in(words);
     }
 
-    /// What is to outlive a loss of power.
+    /// The state to be retained through a loss of power.
     #[must_use]
-    pub fn kept(&self) -> Kept {
-        self.encoder.kept()
+    pub fn retained_state(&self) -> RetainedState {
+        self.encoder.retained_state()
     }
 }

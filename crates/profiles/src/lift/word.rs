@@ -1,12 +1,14 @@
-//! The words of virtual inputs (6010h) and virtual outputs (6011h), and which output is meant for whom.
+//! The words of virtual inputs (6010h) and virtual outputs (6011h), and the rules which lamp or input an output
+//! addresses.
 //!
 //! ```text
 //! byte 0          1            2         3        4        5
 //! basic function  sub-function lifts     floor    doors    function data
 //! ```
 //!
-//! Lifts are a bit for each, the floor is 00h for the car and `FFh` for any, doors are bits 0 to 3 (bits 4 to 7 are destination
-//! doors of destination calls), `FFh` for any. The sources of these facts are in `docs/lift.md`.
+//! Lifts have one bit each. The floor is 00h for the car and `FFh` for any floor. Doors are bits 0 to 3 (bits 4 to 7
+//! are the destination doors of destination calls), `FFh` for any door. The sources of these facts are in
+//! `docs/lift.md`.
 
 /// A word of 48 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,7 +22,7 @@ const COMMAND: u8 = 0x00;
 const POSITION_INDICATION: u8 = 0x40;
 /// Basic function of an input: a special function.
 const SPECIAL: u8 = 0x0E;
-/// Doors 1 to 4 in calls whose upper door bits are those of the destination.
+/// Bits of the doors 1 to 4; in calls with a destination, the upper bits are the destination doors.
 const SOURCE_DOORS: u8 = 0x0F;
 
 impl Word {
@@ -32,7 +34,7 @@ impl Word {
         self.0[1]
     }
 
-    /// The lifts that it is about.
+    /// The lifts that the word concerns.
     #[must_use]
     pub const fn lifts(self) -> u8 {
         self.0[2]
@@ -54,12 +56,12 @@ impl Word {
         matches!(self.function(), 0x02..=0x04)
     }
 
-    /// Hall, car and destination calls. The priority is a part of the function: standard, low, high.
+    /// Hall, car and destination calls. The priority (standard, low, high) is part of the function.
     const fn is_call(self) -> bool {
         matches!(self.function(), 0x02..=0x0D)
     }
 
-    /// The word of an input that is set or not: bits 0 and 1 of the function data.
+    /// The word with the state of an input: bits 0 and 1 of the function data.
     #[must_use]
     #[inline(never)]
     pub const fn with_state(self, is_set: bool) -> Word {
@@ -68,7 +70,7 @@ impl Word {
         Word(bytes)
     }
 
-    /// Whether `output` is for a lamp that has this word.
+    /// Whether `output` addresses the lamp with this word.
     #[must_use]
     #[inline(never)]
     pub fn is_meant_by(self, output: Word) -> bool {
@@ -82,7 +84,7 @@ impl Word {
         have_lift && self.shares_floor(output) && self.shares_door(output)
     }
 
-    /// Whether `command`, as a command of the call controller, asks the input with this word for its state.
+    /// Whether `command`, a command of the call controller, asks the input with this word for its state.
     #[must_use]
     #[inline(never)]
     pub fn is_asked_by(self, command: Word) -> bool {
@@ -108,7 +110,7 @@ impl Word {
         self.doors() == ANY || other.doors() == ANY || self.doors() & other.doors() & relevant != 0
     }
 
-    /// What an output makes of a lamp.
+    /// The light that an output asks for.
     #[must_use]
     pub const fn light(self) -> Light {
         let data = self.data();
@@ -121,7 +123,7 @@ impl Word {
     }
 }
 
-/// How a lamp is lit, as 2322h says: 0 off, 10h to 17h flashing, any other value on.
+/// Light of a lamp, in the codes of 2322h: 0 off, 10h to 17h flashing, any other value on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Light(pub u8);
 
@@ -135,7 +137,7 @@ impl Light {
         Light(0x10 | parameter & 0x07)
     }
 
-    /// Milliseconds of the period of a flashing lamp.
+    /// Period of a flashing lamp in milliseconds.
     #[must_use]
     pub const fn period(self) -> Option<u32> {
         const PERIODS: [u32; 8] = [100, 133, 200, 500, 666, 1000, 2000, 4000];

@@ -1,22 +1,23 @@
-//! The calibration of the transducer: from its output ratio to Pa, with its dependence on the temperature taken out.
+//! The calibration of the transducer: from its output ratio to Pa, compensated for temperature.
 
-/// Limits of the temperature within which a calibration holds, in K: -40 to 125 degC, those of the chip.
+/// Lower limit of the temperature for which a calibration holds, in K: -40 degC, the limit of the chip. `HOTTEST`: 125
+/// degC.
 const COLDEST: f32 = 233.15;
 const HOTTEST: f32 = 398.15;
 
-/// `constant + linear t + quadratic t²`, with `t` in K from the reference temperature.
+/// `constant + linear t + quadratic t²`, with `t` in K relative to the reference temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polynomial {
-    /// At the reference temperature.
+    /// Value at the reference temperature.
     pub constant: f32,
-    /// Per K.
+    /// Coefficient per K.
     pub linear: f32,
-    /// Per K².
+    /// Coefficient per K².
     pub quadratic: f32,
 }
 
 impl Polynomial {
-    /// What does not depend on the temperature.
+    /// A polynomial that does not depend on the temperature.
     #[must_use]
     pub const fn constant(constant: f32) -> Polynomial {
         Polynomial { constant, linear: 0.0, quadratic: 0.0 }
@@ -26,7 +27,7 @@ impl Polynomial {
         self.constant + t * (self.linear + t * self.quadratic)
     }
 
-    /// Where it is largest and smallest in an interval: at the ends, or at its vertex. A straight line has none.
+    /// The extreme values in an interval: at its ends or at the vertex. A straight line has no vertex.
     #[inline(never)]
     fn extremes(&self, low: f32, high: f32) -> [f32; 3] {
         let vertex = -self.linear / (2.0 * self.quadratic);
@@ -41,7 +42,7 @@ impl Polynomial {
 /// p = start + (end - start) * (ratio - zero(t)) / span(t),    t = T - reference
 /// ```
 ///
-/// `T` is the measured temperature, held at -40 and 125 degC beyond them; where there is none, `t` is 0.
+/// `T` is the measured temperature, limited to -40 to 125 degC. Without a measured temperature, `t` is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureCalibration {
     /// Pressure at the start of the range in Pa.
@@ -50,9 +51,9 @@ pub struct PressureCalibration {
     pub end: f32,
     /// Ratio at the start of the range.
     pub zero: Polynomial,
-    /// Ratio at the end of the range less that at its start.
+    /// Ratio at the end of the range minus the ratio at its start.
     pub span: Polynomial,
-    /// Temperature from which the polynomials count, in K.
+    /// Reference temperature of the polynomials in K.
     pub reference: f32,
     /// A ratio below this means a broken sensor or wire.
     pub break_low: f32,
@@ -61,7 +62,7 @@ pub struct PressureCalibration {
 }
 
 impl Default for PressureCalibration {
-    /// 10 % to 90 % of the supply are 0 to 10 bar; below 2.5 % or above 97.5 % the sensor is broken.
+    /// 10 % to 90 % of the supply are 0 to 10 bar. Below 2.5 % or above 97.5 % the sensor is broken.
     fn default() -> PressureCalibration {
         PressureCalibration {
             start: 0.0,
@@ -76,20 +77,20 @@ impl Default for PressureCalibration {
 }
 
 impl PressureCalibration {
-    /// The pressure in Pa at a ratio and a temperature in K, beyond the ends of the range too.
+    /// The pressure in Pa at a ratio and a temperature in K, also beyond the ends of the range.
     #[must_use]
     pub fn pressure(&self, ratio: f32, kelvin: Option<f32>) -> f32 {
         let t = kelvin.map_or(0.0, |kelvin| kelvin.clamp(COLDEST, HOTTEST) - self.reference);
         self.start + (self.end - self.start) * ((ratio - self.zero.at(t)) / self.span.at(t))
     }
 
-    /// Whether no intact sensor gives this ratio.
+    /// Whether the ratio is outside the range of an intact sensor.
     #[must_use]
     pub fn is_break(&self, ratio: f32) -> bool {
         ratio < self.break_low || ratio > self.break_high
     }
 
-    /// Whether it gives one finite pressure for each ratio, and a higher one for a higher ratio, at every temperature.
+    /// Whether the calibration gives one finite pressure for each ratio, rising with the ratio, at every temperature.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let (low, high) = (COLDEST - self.reference, HOTTEST - self.reference);

@@ -10,12 +10,12 @@ pub const STATUS_ABOVE: u8 = 0x02;
 /// 6150h bit 2: a process value is below its span.
 pub const STATUS_BELOW: u8 = 0x04;
 
-/// The limits between which a process value is neither too high nor too low.
+/// The span of a process value: outside of these limits the value is too low or too high.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span<T> {
-    /// 6148h, 7148h, 9148h.
+    /// Start (6148h, 7148h, 9148h).
     pub start: T,
-    /// 6149h, 7149h, 9149h.
+    /// End (6149h, 7149h, 9149h).
     pub end: T,
 }
 
@@ -37,7 +37,7 @@ pub struct ChannelParameters {
     pub scaling_factor: f32,
     /// 6127h, added after the factor, in Pa or K.
     pub scaling_offset: f32,
-    /// 6131h.
+    /// 6131h, unit of the process value.
     pub unit: Unit,
     /// 6124h, added to the process value in its unit.
     pub offset: f32,
@@ -52,7 +52,7 @@ pub struct ChannelParameters {
 }
 
 impl ChannelParameters {
-    /// The values of a fresh device, with the unit and the span of its channel.
+    /// Default values of a channel, with its unit and its span.
     #[must_use]
     pub const fn new(unit: Unit, span: Span<f32>) -> ChannelParameters {
         ChannelParameters {
@@ -70,18 +70,18 @@ impl ChannelParameters {
     }
 }
 
-/// What a channel gives for one sample.
+/// Output of a channel for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChannelValues {
-    /// 6100h, field value in Pa or K, as measured.
+    /// 6100h, measured field value in Pa or K.
     pub field_value: f32,
     /// 6130h, process value in the unit of 6131h.
     pub process_value: f32,
-    /// 7130h, process value with its decimal digits shifted before the point.
+    /// 7130h, process value times 10 to the power of its decimal digits.
     pub process_value16: i16,
-    /// 9130h, the same with 32 bits.
+    /// 9130h, the same value with 32 bits.
     pub process_value32: i32,
-    /// 6150h.
+    /// 6150h, status.
     pub status: u8,
 }
 
@@ -104,15 +104,15 @@ impl Channel {
         Channel { parameters: *parameters, filter, recovery, shift: shift(parameters.digits) }
     }
 
-    /// Takes over parameters. The filter only starts afresh when it is another one.
+    /// Takes over parameters. The filter restarts only if its own parameters have changed.
     pub fn apply(&mut self, parameters: &ChannelParameters) {
         let fresh = Channel::new(parameters);
         let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };
         *self = Channel { filter, recovery: self.recovery, ..fresh };
     }
 
-    /// Takes note of whether the next field value comes from an intact sensor, and says whether the values are still those of
-    /// a fault: a fault holds until the filter is full of good samples.
+    /// Takes note of whether the next field value comes from a faulty sensor. Returns whether the values still count as
+    /// faulty: a fault lasts until the filter is full of good samples.
     pub fn is_faulty(&mut self, is_faulty: bool) -> bool {
         self.recovery.next(is_faulty, &mut self.filter)
     }
@@ -136,7 +136,7 @@ impl Channel {
     }
 }
 
-/// The nearest finite number, and 0 for what is none: nothing else ever leaves the channel.
+/// The nearest finite number, and 0 for NaN, because a channel must give finite values only.
 fn finite(value: f32) -> f32 {
     match value {
         finite if finite.is_finite() => finite,
@@ -146,7 +146,7 @@ fn finite(value: f32) -> f32 {
     }
 }
 
-/// Towards zero, to the nearest limit when out of range, 0 for what is not a number: what `as` is defined to do.
+/// Rounds towards zero. A value out of range gives the nearest limit, and NaN gives 0, as defined for `as`.
 #[allow(clippy::cast_possible_truncation)]
 fn truncate16(value: f32) -> i16 {
     value as i16
@@ -157,12 +157,12 @@ fn truncate32(value: f32) -> i32 {
     value as i32
 }
 
-/// Whether no format is clipped; what fits 16 bits fits 32, and is no overflow. Not a number fits nothing.
+/// Whether no integer format is clipped: a value that fits 16 bits also fits 32. False for NaN.
 fn fits16(value: f32) -> bool {
     value > f32::from(i16::MIN) - 1.0 && value < f32::from(i16::MAX) + 1.0
 }
 
-/// Ten to the power of so many digits; beyond the 38 of single precision nothing fits any format.
+/// Ten to the power of `digits`. Beyond the 38 digits of single precision, no value fits any format.
 fn shift(digits: u8) -> f32 {
     match i8::try_from(digits) {
         Ok(digits) if digits <= 38 => Precise::ONE.shifted(digits).rounded(),

@@ -1,7 +1,7 @@
 //! Filters on the field value, objects 61A0h and 61A1h.
 //!
-//! The state has twice the digits of single precision ([`Precise`]): with a constant of 255, single precision would drop
-//! increments below 255 units of the last place and the output would stick beside its target.
+//! The state has twice the digits of single precision ([`Precise`]). With a constant of 255, single precision would
+//! drop increments below 255 units of the last place, and the output would stop short of its target.
 
 use super::precise::Precise;
 
@@ -10,9 +10,9 @@ use super::precise::Precise;
 pub struct Filter {
     kind: Kind,
     constant: u8,
-    /// Output; `None` until the first input.
+    /// Last output; `None` until the first input.
     output: Option<Precise>,
-    /// Inputs of the block under way, for the repeating average.
+    /// Sum of the inputs in the present block, for the repeating average.
     sum: Precise,
     count: u8,
 }
@@ -25,7 +25,8 @@ enum Kind {
 }
 
 impl Filter {
-    /// By the values of 61A0h and 61A1h. Types above 2 are accepted and act as none; a constant of 0 acts as 1.
+    /// The filter for the values of 61A0h and 61A1h. Types above 2 are accepted and act as no filter; a constant of 0
+    /// acts as 1.
     #[must_use]
     pub fn new(kind: u8, constant: u8) -> Filter {
         let kind = match kind {
@@ -36,13 +37,13 @@ impl Filter {
         Filter { kind, constant: constant.max(1), output: None, sum: Precise::ZERO, count: 0 }
     }
 
-    /// Whether it is the same filter, whatever its state.
+    /// Whether both filters have the same parameters, whatever their states.
     #[must_use]
     pub fn is_like(&self, other: &Filter) -> bool {
         (self.kind, self.constant) == (other.kind, other.constant)
     }
 
-    /// How many inputs fill it: the constant, or one where there is no filter.
+    /// Number of inputs that fill the filter: its constant, or one without a filter.
     #[must_use]
     pub fn length(&self) -> u16 {
         match self.kind {
@@ -56,7 +57,8 @@ impl Filter {
         (self.output, self.sum, self.count) = (None, Precise::ZERO, 0);
     }
 
-    /// Takes an input and gives the output. The first input is the first output, so that nothing starts with a step from 0.
+    /// Takes an input and returns the output. The first input is the first output, so the output never starts with a
+    /// step from 0.
     pub fn next(&mut self, input: f32) -> f32 {
         match self.kind {
             Kind::None => input,
@@ -70,7 +72,7 @@ impl Filter {
         *self.output.insert(last.plus(input.minus(last).over(self.constant)))
     }
 
-    /// A new output at the end of every block, held in between.
+    /// Gives a new output at the end of every block; the output stays constant in between.
     fn repeating_average(&mut self, input: Precise) -> Precise {
         self.sum = self.sum.plus(input);
         self.count = self.count.saturating_add(1);
@@ -132,7 +134,7 @@ mod tests {
         inputs.iter().map(|&input| step(input.into())).collect()
     }
 
-    /// Numbers of one sign and of both, of like and of unlike size.
+    /// Numbers of one sign and of both signs, of similar and of different size.
     fn any_inputs() -> impl Strategy<Value = Vec<f32>> {
         let any = prop_oneof![0.0..1e6_f32, -1e3..1e3_f32, -1e30..1e30_f32, Just(0.0)];
         prop::collection::vec(any, 1..600)

@@ -1,8 +1,8 @@
 //! The pressure and temperature channels: CiA 404, analogue input function block.
 //!
-//! Converter readings become field values in Pa and K (6100h) by the calibration of the device; a channel filters them (61A0h, 61A1h), scales them
-//! (6126h, 6127h), converts them to the unit and prefix of 6131h, adds the offset 6124h, and gives the process value
-//! in three number formats (6130h, 7130h, 9130h) with a status (6150h).
+//! The calibration of the device converts converter readings to field values in Pa and K (6100h). A channel then
+//! filters them (61A0h, 61A1h), scales them (6126h, 6127h), converts them to the unit and prefix of 6131h, adds the
+//! offset 6124h, and gives the process value in three number formats (6130h, 7130h, 9130h) with a status (6150h).
 
 mod calibration;
 mod channel;

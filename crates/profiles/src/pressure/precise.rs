@@ -1,14 +1,15 @@
-//! Numbers with twice the digits of single precision, as the sum of two.
+//! Numbers with twice the digits of single precision, as the sum of two numbers.
 //!
-//! The FPU of a Cortex-M4 has single precision only. Double precision is done in software there, and an addition takes some
-//! hundred instructions; here it takes ten of the FPU. The sum of two numbers and what is lost when it is rounded are exact
-//! by Knuth (The Art of Computer Programming, volume 2, 4.2.2), and the remainder of a division is by Dekker (A
-//! floating-point technique for extending the available precision, 1971). Results are good to 2^-46.
+//! The FPU of a Cortex-M4 has single precision only. Double precision is done in software, where an addition takes some
+//! hundred instructions; here it takes ten instructions of the FPU. The rounded sum of two numbers and its rounding
+//! error are exact by Knuth (The Art of Computer Programming, volume 2, 4.2.2), and the remainder of a division is
+//! exact by Dekker (A floating-point technique for extending the available precision, 1971). Results are accurate to
+//! 2^-46.
 
-/// The largest number that is taken: 255 of them do not overflow, nor does the difference of two.
+/// The largest number that is accepted: neither a sum of 255 such numbers nor the difference of two overflows.
 pub(super) const LARGEST: f32 = f32::MAX / 512.0;
 
-/// A number: the nearest of single precision, and what it lacks.
+/// A number: the nearest number of single precision, and the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Precise {
     high: f32,
@@ -19,14 +20,14 @@ impl Precise {
     pub(super) const ZERO: Precise = Precise { high: 0.0, low: 0.0 };
     pub(super) const ONE: Precise = Precise { high: 1.0, low: 0.0 };
 
-    /// The nearest number to one of double precision: for constants, the target computes those with difficulty.
+    /// The nearest number to one of double precision. For constants: the target computes double precision slowly.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) const fn near_double(value: f64) -> Precise {
         let high = value as f32;
         Precise { high, low: (value - high as f64) as f32 }
     }
 
-    /// A number of single precision, held at [`LARGEST`] beyond it.
+    /// A number of single precision, limited to ±[`LARGEST`].
     pub(super) fn of(value: f32) -> Precise {
         Precise { high: value.clamp(-LARGEST, LARGEST), low: 0.0 }
     }
@@ -45,7 +46,8 @@ impl Precise {
         self.plus(Precise { high: -other.high, low: -other.low })
     }
 
-    /// So many powers of ten up, or down. One up is the sum of eight times and twice the number, which are exact.
+    /// Multiplied by ten to the power of `digits`. Ten times a number is the sum of 8 times and 2 times the number,
+    /// which are exact.
     pub(super) fn shifted(self, digits: i8) -> Precise {
         let times = |value: Precise, factor| Precise { high: value.high * factor, low: value.low * factor };
         (0..digits.unsigned_abs()).fold(self, |value, _| {
@@ -53,7 +55,7 @@ impl Precise {
         })
     }
 
-    /// Divided by a whole number, at least 1.
+    /// Divided by a whole number, which must not be 0.
     pub(super) fn over(self, divisor: u8) -> Precise {
         let divisor = f32::from(divisor);
         let quotient = self.high / divisor;
@@ -70,7 +72,7 @@ impl Precise {
     }
 }
 
-/// What the rounding of a sum has taken away.
+/// The rounding error of a sum.
 fn lost(a: f32, b: f32) -> f32 {
     let sum = a + b;
     let of_b = sum - a;

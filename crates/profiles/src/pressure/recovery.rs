@@ -1,28 +1,28 @@
-//! The end of a fault: when the values behind the filter are those of an intact sensor again.
+//! End of a fault: the moment from which the filtered values are those of an intact sensor again.
 
 use super::Filter;
 
-/// Samples after a fault that do not count: the conversions of the first one began while the fault was still there, so their
-/// mean is neither the fault nor the signal.
+/// Samples after a fault that are ignored: the conversions of the first one began during the fault, so their mean is
+/// neither the fault nor the signal.
 const SETTLING: u16 = 2;
 
-/// Holds a fault until the filter has nothing but good samples in it.
+/// Holds a fault until the filter contains good samples only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recovery {
-    /// Good samples that are still missing.
+    /// Number of good samples still missing.
     missing: u16,
 }
 
 impl Recovery {
-    /// Takes note of a sample before the filter takes it, and says whether the values are still those of a fault. The filter
-    /// begins anew with the first sample that counts.
+    /// Takes note of a sample before the filter takes it. Returns whether the values still count as faulty. The filter
+    /// restarts with the first sample that is not ignored.
     #[inline]
     pub fn next(&mut self, is_faulty: bool, filter: &mut Filter) -> bool {
         let is_well = !is_faulty && self.missing == 0;
         !is_well && self.hold(is_faulty, filter)
     }
 
-    // Most samples are good ones, and their time is short.
+    // Most samples are good ones, and their processing time is short.
     #[cold]
     #[inline(never)]
     fn hold(&mut self, is_faulty: bool, filter: &mut Filter) -> bool {
@@ -43,7 +43,7 @@ impl Recovery {
 mod tests {
     use super::*;
 
-    /// What comes out behind a fault, once the fault is over.
+    /// Outputs of the filter after a fault, from the end of the fault on.
     fn after_a_fault(kind: u8, constant: u8, inputs: &[f32]) -> Vec<f32> {
         let (mut filter, mut recovery) = (Filter::new(kind, constant), Recovery::default());
         for input in [0.1, 7.0, 0.9] {

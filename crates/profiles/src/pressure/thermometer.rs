@@ -5,7 +5,7 @@ use crate::board::{ChipThermometer, RawSample};
 /// Codes of a 12-bit conversion.
 const CODES: u32 = 4096;
 
-/// What measures the temperature.
+/// Source of the temperature.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Thermometer {
     /// The sensor inside the chip.
@@ -21,14 +21,14 @@ pub enum Thermometer {
 /// 1 / T = a + b ln R + c (ln R)³,    R = series * n / (4096 - n)
 /// ```
 ///
-/// A thermistor that is known by its resistance R0 at T0 and its beta has a = 1/T0 - ln R0 / beta, b = 1/beta, c = 0.
+/// A thermistor specified by its resistance R0 at T0 and its beta has a = 1/T0 - ln R0 / beta, b = 1/beta, c = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thermistor {
-    /// In 1/K.
+    /// Coefficient a in 1/K.
     pub a: f32,
-    /// In 1/K, for R in ohm.
+    /// Coefficient b in 1/K, for R in ohm.
     pub b: f32,
-    /// In 1/K.
+    /// Coefficient c in 1/K.
     pub c: f32,
     /// The resistor to VDDA in ohm.
     pub series: f32,
@@ -38,16 +38,16 @@ pub struct Thermistor {
     pub break_high: f32,
 }
 
-/// The calibration of the temperature: what is measured, times the factor, plus the offset.
+/// The calibration of the temperature: the measured temperature times the factor, plus the offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemperatureCalibration {
-    /// What measures it.
+    /// Source of the temperature.
     pub thermometer: Thermometer,
     /// Factor on the measured temperature in K.
     pub factor: f32,
-    /// Added after it, in K.
+    /// Added after the factor, in K.
     pub offset: f32,
-    /// Used when it measures.
+    /// Used if the thermistor is the source.
     pub thermistor: Thermistor,
 }
 
@@ -73,8 +73,8 @@ impl Default for TemperatureCalibration {
 }
 
 impl TemperatureCalibration {
-    /// The temperature in K; `None` when it is not measured: an input at a rail, a broken thermistor, a chip without a
-    /// calibration, or no number.
+    /// The temperature in K; `None` if it cannot be measured: an input at a rail, a broken thermistor, a chip without a
+    /// calibration, or a result that is not finite.
     #[must_use]
     pub fn temperature(&self, raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
         let measured = match self.thermometer {
@@ -107,8 +107,8 @@ impl Thermistor {
         self.a + log * (self.b + self.c * log * log)
     }
 
-    /// A higher resistance must be a lower temperature wherever the converter can tell. The slope `b + 3c (ln R)²` is
-    /// monotonic in the square of the logarithm, so it has its extremes at an end or at 1 ohm.
+    /// A higher resistance must be a lower temperature over the whole range of the converter. The slope `b + 3c (ln
+    /// R)²` is monotonic in the square of the logarithm, so its extremes are at an end of the range or at 1 ohm.
     fn is_valid(&self) -> bool {
         let ends = [self.series / real(CODES), 1.0, self.series * real(CODES)];
         let falls = |log: f32| self.b + 3.0 * self.c * log * log > 0.0 && self.reciprocal(log).is_finite();
@@ -117,8 +117,8 @@ impl Thermistor {
     }
 }
 
-/// Sensor and reference are read against the same supply, so their quotient does not depend on it. Without a reference or a
-/// characteristic the result is no number.
+/// The temperature from the chip's sensor. Sensor and reference are converted against the same supply, so their
+/// quotient does not depend on the supply. Without a reference or a characteristic the result is NaN.
 fn internal(raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
     if raw.is_rail(raw.temperature) {
         return None;
@@ -126,7 +126,7 @@ fn internal(raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
     Some(chip.offset + chip.slope * (real(raw.temperature) / real(raw.reference)))
 }
 
-/// Exact up to 2^24: sums of 4096 conversions.
+/// Exact up to 2^24, the sum of 4096 conversions.
 #[allow(clippy::cast_precision_loss)]
 fn real(sum: u32) -> f32 {
     sum as f32

@@ -9,17 +9,17 @@ use crate::profile::Chain;
 /// Samples in a second: how often a sensor break is looked for (CiA 404 leaves it to the device).
 const SAMPLES_PER_SECOND: u16 = 1000;
 
-/// What is found out in production: from converter readings to Pa and K.
+/// The calibration made in production: from converter readings to Pa and K.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Calibration {
-    /// Of the transducer.
+    /// Calibration of the transducer.
     pub pressure: PressureCalibration,
-    /// Of the thermometer.
+    /// Calibration of the thermometer.
     pub temperature: TemperatureCalibration,
 }
 
 impl Calibration {
-    /// Whether readings and field values belong together one to one, and rise together.
+    /// Whether each reading has one field value, rising with the reading.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.pressure.is_valid() && self.temperature.is_valid()
@@ -33,7 +33,7 @@ pub struct Parameters {
     pub pressure: ChannelParameters,
     /// Sub-index 2 of the profile's objects.
     pub temperature: ChannelParameters,
-    /// From converter readings to field values.
+    /// Calibration: from converter readings to field values.
     pub calibration: Calibration,
 }
 
@@ -47,29 +47,30 @@ impl Default for Parameters {
     }
 }
 
-/// What is wrong with the sensor.
+/// Faults of the sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conditions {
-    /// The transducer or its wiring is broken; looked for once a second.
+    /// The transducer or its wiring is broken; checked once a second.
     pub sensor_break: bool,
     /// The pressure input is at a rail of the converter.
     pub pressure_rail: bool,
-    /// The temperature is not measured: input at a rail, or a chip without a calibration of its own sensor.
+    /// The temperature cannot be measured: input at a rail, broken thermistor, or a chip without a calibration of its
+    /// own sensor.
     pub temperature_rail: bool,
 }
 
-/// What the transmitter gives for one sample.
+/// Output of the transmitter for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Sub-index 1 of the profile's objects.
     pub pressure: ChannelValues,
     /// Sub-index 2 of the profile's objects.
     pub temperature: ChannelValues,
-    /// What is wrong with the sensor.
+    /// Faults of the sensors.
     pub conditions: Conditions,
 }
 
-/// The whole chain with its state.
+/// The whole measuring chain with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmitter {
     chip: ChipThermometer,
@@ -77,16 +78,16 @@ pub struct Transmitter {
     pressure: Channel,
     temperature: Channel,
     conditions: Conditions,
-    /// There is no condition, and no filter has a sample of one in it.
+    /// No fault is present, and no filter contains a sample taken during a fault.
     is_well: bool,
-    /// Samples until the next look for a sensor break.
+    /// Samples until the next check for a sensor break.
     until_check: u16,
 }
 
 impl Transmitter {
     /// A chain that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
-    #[inline(never)] // Called once, from several places.
+    #[inline(never)] // Several callers, of which one runs.
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> Transmitter {
         Transmitter {
             chip,
@@ -113,12 +114,12 @@ impl Transmitter {
         let pressure = self.calibration.pressure.pressure(ratio, kelvin);
         let is_valid = !conditions.sensor_break && !conditions.pressure_rail;
         snapshot.pressure = self.pressure.sample(pressure, is_valid);
-        // A temperature that is not measured is 0 K, as for a transmitter without a temperature sensor.
+        // A temperature that cannot be measured reads 0 K, as in a transmitter without a temperature sensor.
         snapshot.temperature = self.temperature.sample(kelvin.unwrap_or(0.0), !conditions.temperature_rail);
         snapshot.conditions = conditions;
     }
 
-    /// What is wrong with the sensors. A condition that is there holds until the filter behind it is full of good samples.
+    /// The faults of the sensors. A fault lasts until the filter behind the sensor is full of good samples.
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
         let is_check = self.until_check == 0;
         self.until_check = if is_check { SAMPLES_PER_SECOND } else { self.until_check } - 1;
@@ -129,7 +130,7 @@ impl Transmitter {
         self.conditions
     }
 
-    // Most samples are good ones, and their time is short.
+    // Most samples are good ones, and their processing time is short.
     #[cold]
     #[inline(never)]
     fn judge(&mut self, is_check: bool, ratio: f32, is_rail: bool, has_no_temperature: bool) {
@@ -209,7 +210,7 @@ mod tests {
         assert!(!transmitter.sample(&GOOD).conditions.sensor_break);
     }
 
-    /// The first valid value after a fault is right, whatever the sample says in which the fault ends.
+    /// The first valid value after a fault is right, whatever the last faulty sample contains.
     #[test]
     fn a_fault_holds_until_the_filter_is_full_of_good_samples() {
         let rail = RawSample { pressure: 0, ..GOOD };
@@ -256,7 +257,7 @@ mod tests {
             (rail, STATUS_INVALID | STATUS_ABOVE, 0),
             (no_temperature, 0, STATUS_INVALID | STATUS_BELOW),
         ] {
-            // With limits that this rail does not pass, so that it is a rail and nothing else.
+            // With limits beyond this rail, so that the rail alone is the fault.
             let mut parameters = Parameters::default();
             parameters.calibration.pressure.break_high = 1.1;
             let snapshot = Transmitter::new(CHIP, &parameters).sample(&raw);

@@ -1,8 +1,9 @@
-//! Physical units of the process value, object 6131h (CiA 303-2 codes, and the codes A0h.. that CiA leaves to profiles).
+//! Physical units of the process value, object 6131h (codes of CiA 303-2, and codes from A0h on, which CiA leaves to
+//! profiles).
 
 use super::precise::Precise;
 
-/// How a field value in Pa or K becomes a process value: `value / divisor - zero`.
+/// Conversion of a field value in Pa or K to a process value: `value / divisor - zero`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
     divisor: f32,
@@ -11,7 +12,7 @@ pub struct Unit {
 
 /// Standard acceleration of gravity in m/s2, exact.
 const GRAVITY: f64 = 9.806_65;
-/// Largest prefix, as a power of ten, either way.
+/// Largest prefix, as a positive or negative power of ten.
 const MAX_PREFIX: i8 = 18;
 
 impl Unit {
@@ -20,7 +21,7 @@ impl Unit {
     /// Degree Celsius, the default of the temperature channel.
     pub const CELSIUS: Unit = Unit { divisor: 1.0, zero: 273.15 };
 
-    /// A pressure unit by the value of 6131h:1; `None` for any that is not supported.
+    /// The pressure unit with this value of 6131h:1; `None` for an unsupported unit.
     #[must_use]
     pub fn pressure(code: u32) -> Option<Unit> {
         let (unit, prefix) = split(code)?;
@@ -41,7 +42,7 @@ impl Unit {
         Some(Unit::prefixed(pascal, Precise::ZERO, prefix))
     }
 
-    /// A temperature unit by the value of 6131h:2; `None` for any that is not supported.
+    /// The temperature unit with this value of 6131h:2; `None` for an unsupported unit.
     #[must_use]
     pub fn temperature(code: u32) -> Option<Unit> {
         let (unit, prefix) = split(code)?;
@@ -54,7 +55,7 @@ impl Unit {
         Some(Unit::prefixed(kelvin, zero, prefix))
     }
 
-    /// The nearest to what double precision gives.
+    /// A unit with a prefix, rounded as from double precision.
     fn prefixed(divisor: Precise, zero: Precise, prefix: i8) -> Unit {
         Unit { divisor: divisor.shifted(prefix).rounded(), zero: zero.shifted(-prefix).rounded() }
     }

@@ -1,4 +1,4 @@
-//! A profile is added: its folder, and one line of the list. docs/extending.md walks through it.
+//! Example of an added profile: its folder, and one line of the list. docs/extending.md explains it.
 
 mod switches;
 
@@ -11,7 +11,7 @@ personalities! {
     Switches => switches, "switches.eds", "Switches and lamps, CiA 401";
 }
 
-/// The half that samples, the half that talks, and what travels between them, as the node has them.
+/// The sampling half, the protocol half, and the values that they exchange, as in the node.
 struct Node {
     image: [u8; IMAGE_SIZE],
     profile: AnyProfile,
@@ -43,7 +43,7 @@ impl Node {
 
     fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), canopen::sdo::Abort> {
         let entry = Personality::Switches.dictionary().find(index, sub)?;
-        // As the device does it: it asks about the objects that say so.
+        // As in the device: the profile is asked about the objects that it handles.
         if switches::handles(index, sub) {
             self.profile.write(&entry, bytes, &mut self.image)?;
         }

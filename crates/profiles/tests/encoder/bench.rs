@@ -1,4 +1,4 @@
-//! An encoder on a shaft or a rod that is moved.
+//! A test bench that moves an encoder, rotary or linear.
 
 use profiles::board::{RawEncoder, SsiFrame};
 use profiles::encoder::{
@@ -7,18 +7,18 @@ use profiles::encoder::{
 };
 use profiles::profile::Chain;
 
-/// The encoder with its parameters, and where the sensors are.
+/// The encoder with its parameters, and the position of the sensors.
 pub(crate) struct Bench {
     pub(crate) encoder: Encoder,
     pub(crate) parameters: Parameters,
-    /// Steps of the sensors since they left the factory.
+    /// Steps of the sensors from their zero.
     pub(crate) total: i64,
     /// Steps that the timer has lost.
     pub(crate) lost: i64,
     pub(crate) raw: RawEncoder,
 }
 
-/// The bench moves in leaps that no encoder is built for, and says so in 2104h.
+/// Parameters for the leaps of the bench, which are faster than any encoder: 2104h is set accordingly.
 pub(crate) fn one(kind: SensorType) -> Parameters {
     let mut parameters = Parameters::default();
     parameters.channels.iter_mut().for_each(|channel| channel.fastest = 10_000);
@@ -26,7 +26,7 @@ pub(crate) fn one(kind: SensorType) -> Parameters {
     parameters
 }
 
-/// With the parameters as delivered.
+/// The parameters as delivered, with this sensor type.
 pub(crate) fn delivered(kind: SensorType) -> Parameters {
     let mut parameters = Parameters::default();
     parameters.channels[0].kind = Some(kind);
@@ -50,7 +50,7 @@ impl Bench {
         Bench { encoder, parameters, total, lost: total, raw: RawEncoder::default() }
     }
 
-    /// Takes over what `change` has changed.
+    /// Applies the changes that `change` makes.
     pub(crate) fn change(&mut self, change: impl FnOnce(&mut Parameters)) {
         change(&mut self.parameters);
         self.encoder.apply(&self.parameters);
@@ -63,7 +63,7 @@ impl Bench {
         });
     }
 
-    /// Moves to `total` within a millisecond; the index comes where a turn of 4096 steps begins.
+    /// Moves to `total` within a millisecond. The index is at the start of a turn of 4096 steps.
     pub(crate) fn go(&mut self, total: i64) -> Snapshot {
         let index = [total, self.total].map(|at| at.div_euclid(4096)).into_iter().max().unwrap_or(0) * 4096;
         let crossed = self.total.div_euclid(4096) != total.div_euclid(4096);
@@ -76,7 +76,7 @@ impl Bench {
         self.go(self.total + by)
     }
 
-    /// A millisecond in which nothing moves but what was moved before.
+    /// A millisecond without further movement.
     pub(crate) fn stay(&mut self) -> Snapshot {
         self.raw.counter = self.counter(self.total);
         self.raw.ssi = Some(frame(self.parameters.format, self.total));
@@ -95,7 +95,7 @@ impl Bench {
         self.stay().channels[0]
     }
 
-    /// What the timer counts while the sensor is there.
+    /// The timer count at this position of the sensor.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn counter(&self, total: i64) -> u16 {
         (total - self.lost) as u16

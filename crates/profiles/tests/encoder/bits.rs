@@ -1,4 +1,4 @@
-//! The registers, bit by bit, as they are printed.
+//! The bits of the registers, as printed in the documents.
 
 use profiles::encoder::{
     ALARM_COMMISSIONING, ALARM_POSITION, CODE_SEQUENCE, COMMISSIONING, Coding, DIRECTION, Format,
@@ -20,7 +20,7 @@ fn those_of_cia_406() {
     assert_eq!(SUPPORTED_WARNINGS, 0b10_1101, "6506h: no light and no battery is measured");
 }
 
-/// 210Bh.
+/// The bits of 210Bh.
 #[test]
 fn those_of_the_sensor_state() {
     let bits = [

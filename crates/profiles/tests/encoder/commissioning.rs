@@ -1,4 +1,4 @@
-//! The commissioning diagnostic finds what it says, and nothing where nothing is.
+//! The commissioning diagnostic finds the faults that it promises, and none without a fault.
 
 use profiles::encoder::{
     ALARM_COMMISSIONING, COMMISSIONING, Coding, Command, Format, Parameters, Parity, Progress, SensorType,
@@ -45,7 +45,7 @@ fn an_open_line_is_found_at_rest() {
     let snapshot = bench.receive(None);
     assert_eq!(snapshot.channels[0].commissioning, Progress::BadReading);
     assert_eq!(snapshot.alarms, ALARM_COMMISSIONING);
-    // It stays, and goes when the diagnostic is no longer wanted and somebody has seen it.
+    // The alarm stays until the diagnostic is switched off and the alarm is acknowledged.
     assert_eq!(progress(&mut bench), Progress::BadReading);
     bench.change(|parameters| {
         parameters.operating = 0;

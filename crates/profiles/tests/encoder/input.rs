@@ -1,4 +1,4 @@
-//! From readings to steps: where the sensor's own zero is, how fast it may be, and when it is out of its range.
+//! From readings to steps: the zero of the sensor, its highest speed, and its range.
 
 use profiles::board::SsiFrame;
 use profiles::profile::Chain;
@@ -14,7 +14,8 @@ use crate::bench::{Bench, frame, one};
 const COUNTED: [SensorType; 2] = [SensorType::IncrementalCounted, SensorType::LinearIncrementalCounted];
 const ABSOLUTE: [SensorType; 2] = [SensorType::MultiTurn, SensorType::LinearAbsolute];
 
-/// The sensor's own zero lies 1000 steps below that of the encoder, and it is right from there to 100 steps further.
+/// The zero of the sensor lies 1000 steps below that of the encoder. The valid range begins at the sensor's zero and is
+/// 100 steps long.
 fn limited(kind: SensorType) -> Parameters {
     let mut parameters = Parameters { module: Module { offset: 1000, low: 1000, high: 1100 }, ..one(kind) };
     parameters.index = false;
@@ -48,7 +49,7 @@ fn a_timer_may_begin_anywhere() {
 fn the_index_is_the_zero_of_the_sensor() {
     for kind in [SensorType::Incremental, SensorType::LinearIncremental] {
         let mut bench = Bench::new(Parameters { index: true, ..limited(kind) });
-        // The index is 100 steps from where it was switched on.
+        // The index is 100 steps from the position at power-on.
         bench.total = -100;
         bench.lost = -100;
         bench.stay();
@@ -119,12 +120,12 @@ fn an_offset_is_known_before_the_first_reading() {
     bench.go(5000);
     bench.preset(0, 100);
     assert_eq!(bench.first().offset, -4900);
-    let kept = bench.encoder.kept();
+    let retained = bench.encoder.retained_state();
     let mut words = [0; profiles::board::RETAINED_WORDS];
     assert!(bench.encoder.retain(&mut words));
-    assert_eq!(words, kept.to_words());
+    assert_eq!(words, retained.to_words());
     bench.parameters.channels[0].offset = -4900;
-    let mut bench = Bench::started(bench.parameters, Start::Kept(kept), 5000);
+    let mut bench = Bench::started(bench.parameters, Start::Retained(retained), 5000);
     assert_eq!(bench.receive(None).channels[0].offset, -4900);
     assert_eq!(bench.first().position, 100);
 }

@@ -1,4 +1,4 @@
-//! The whole encoder, from what the hardware reads to the snapshot.
+//! The whole encoder, from the readings of the hardware to the snapshot.
 
 mod bench;
 mod bits;

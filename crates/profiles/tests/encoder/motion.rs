@@ -1,4 +1,4 @@
-//! Position and speed of a shaft and of a rod that move.
+//! Position and speed of a moving rotary or linear encoder.
 
 use profiles::encoder::{
     CODE_SEQUENCE, Cam, Cams, DIRECTION, SCALING, SENSOR_INDEX, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED,
@@ -7,12 +7,12 @@ use profiles::encoder::{
 
 use crate::bench::{Bench, one, two};
 
-/// 6000 rpm of a sensor with 4096 steps: steps after so many milliseconds.
+/// 6000 rpm with 4096 steps per turn: steps after `millis` milliseconds.
 fn at_6000_rpm(millis: i64) -> i64 {
     (4096 * millis).div_euclid(10)
 }
 
-/// In hundredths of a degree over ten revolutions, so the wrap comes ten times a second, in both directions.
+/// In hundredths of a degree over ten revolutions, the position wraps ten times a second, in both directions.
 #[test]
 fn a_shaft_at_6000_rpm_crosses_the_wrap_both_ways() {
     for kind in [SensorType::IncrementalCounted, SensorType::MultiTurn] {
@@ -59,7 +59,7 @@ fn the_speed_has_no_jump_where_the_position_wraps() {
     }
 }
 
-/// A rod with steps of 1 um at 0.3 m/s, read in 10 um and mm/s.
+/// A linear encoder with steps of 1 um at 0.3 m/s, with measuring steps of 10 um and mm/s.
 #[test]
 fn a_rod_has_its_own_measuring_steps() {
     let mut parameters = one(SensorType::LinearIncremental);
@@ -95,7 +95,7 @@ fn the_first_index_is_the_zero_of_the_turn() {
     assert_eq!(bench.first().position, 0, "nobody knows yet");
     let values = bench.go(4196).channels[0];
     assert_eq!((values.position, values.sensor_state), (100, 0));
-    // Backwards over it again: nothing to put right.
+    // Backwards over the index again: no correction.
     let values = bench.go(4000).channels[0];
     assert_eq!((values.position, values.sensor_state), (4000, 0));
 }
@@ -148,7 +148,7 @@ fn the_zero_of_a_rod_is_at_its_reference_mark() {
     assert_eq!(bench.first().position, 130);
 }
 
-/// Seen once, and then no more: by whatever way a turn and a quarter is made.
+/// The index comes once and then no more. Whichever way the turn and a quarter is made, the loss is noticed.
 #[test]
 fn an_index_that_is_lost_is_noticed_every_time() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));

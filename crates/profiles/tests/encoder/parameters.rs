@@ -1,4 +1,4 @@
-//! What parameters say of the sensors, and what the snapshot says of parameters.
+//! How parameters describe the sensors, and the parts of the snapshot that depend on parameters alone.
 
 use profiles::encoder::{
     CODE_SEQUENCE, COMMISSIONING, Command, DIRECTION, Parameters, SCALING, SensorType, Snapshot,

@@ -1,27 +1,27 @@
-//! What outlives a loss of power.
+//! State retained through a loss of power.
 
 use profiles::board::Retained;
 use profiles::encoder::{
-    ALARM_POSITION, CODE_SEQUENCE, Encoder, Kept, Lasting, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED,
-    SensorType, Start,
+    ALARM_POSITION, CODE_SEQUENCE, Encoder, PositionRecord, RetainedState, SENSOR_POSITION_ERROR,
+    SENSOR_UNREFERENCED, SensorType, Start,
 };
 use profiles::profile::Chain;
 
 use crate::bench::{Bench, one, two};
 
-/// The power is lost, the sensor is moved to `total`, the power comes back.
+/// Loses the power, moves the sensor to `total`, and restores the power.
 fn after_power_loss(bench: &Bench, total: i64) -> Bench {
-    let kept = Kept::from_words(&bench.encoder.kept().to_words());
-    Bench::started(bench.parameters, Start::Kept(kept), total)
+    let retained = RetainedState::from_words(&bench.encoder.retained_state().to_words());
+    Bench::started(bench.parameters, Start::Retained(retained), total)
 }
 
-/// The same without a battery: the parameter store has what a start must know.
+/// The same with an empty battery: only the parameter store has data for the start.
 fn after_loss_of_memory(bench: &Bench, total: i64) -> Bench {
-    let stored = Lasting::of(&bench.encoder.kept().to_words()).to_words();
+    let stored = PositionRecord::of(&bench.encoder.retained_state().to_words()).to_words();
     Bench::started(bench.parameters, Start::of(Retained::Nothing, Some(stored)), total)
 }
 
-/// What a preset stores.
+/// Stores the offsets, as a preset does.
 fn store_offsets(bench: &mut Bench) {
     let offsets = bench.stay().channels.map(|channel| channel.offset);
     bench.parameters.channels.iter_mut().zip(offsets).for_each(|(own, offset)| own.offset = offset);
@@ -50,7 +50,7 @@ fn what_is_not_counted_electronically_starts_afresh() {
     }
 }
 
-/// Turned while off, by less than half of what the sensor tells apart.
+/// Turned during a loss of power, by less than half of the sensor's range.
 #[test]
 fn an_absolute_sensor_knows_what_happened_in_the_dark() {
     let mut bench = Bench::new(one(SensorType::SingleTurnCounted));
@@ -92,7 +92,7 @@ fn the_offset_is_stored_with_the_parameters() {
     store_offsets(&mut bench);
     let positions = |bench: &mut Bench| bench.stay().channels.map(|channel| channel.position);
     assert_eq!(positions(&mut after_power_loss(&bench, 1000)), [10, 20]);
-    // Parameters that were changed and not saved are the old ones again, and so is the offset that belongs to them.
+    // Parameters that were changed but not saved have their old values again, and the old offset fits them.
     let saved = bench.parameters;
     bench.change(|parameters| parameters.operating = CODE_SEQUENCE);
     bench.stay();
@@ -102,7 +102,8 @@ fn the_offset_is_stored_with_the_parameters() {
     assert_eq!(positions(&mut after_power_loss(&bench, 1000)), [10, 20]);
 }
 
-/// An absolute position is where it was; one that only a memory knows is never shown as known before it is referenced.
+/// An absolute position is unchanged. A position that needs retained memory is never shown as known before it is
+/// referenced.
 #[test]
 fn without_a_battery_a_position_is_right_or_says_that_it_is_lost() {
     let lost = SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR;
@@ -128,7 +129,7 @@ fn without_a_battery_a_position_is_right_or_says_that_it_is_lost() {
         if state == 0 {
             continue;
         }
-        // A reset does not make it known.
+        // A reset does not make the position known.
         assert_eq!(after_power_loss(&back, 86_100).first().sensor_state & SENSOR_POSITION_ERROR, 1 << 7);
         back.preset(0, 600);
         let values = back.first();
@@ -138,7 +139,7 @@ fn without_a_battery_a_position_is_right_or_says_that_it_is_lost() {
     }
 }
 
-/// 360 units a turn and 1000 in all: 4096 turns are no whole number of ranges, so it matters how often the code came round.
+/// 360 units a turn and a range of 1000: 4096 turns are not a whole number of ranges, so the number of wraps matters.
 #[test]
 fn a_scaled_position_is_known_without_a_battery_until_the_code_has_come_round() {
     let mut parameters = one(SensorType::MultiTurn);
@@ -155,7 +156,7 @@ fn a_scaled_position_is_known_without_a_battery_until_the_code_has_come_round() 
     }
 }
 
-/// With an index in every turn and a range of a turn, the index alone says where the sensor is.
+/// With an index in every turn and a range of one turn, the index alone determines the position.
 #[test]
 fn an_index_is_reference_enough_where_every_turn_is_alike() {
     let mut parameters = one(SensorType::IncrementalCounted);
@@ -182,18 +183,18 @@ fn what_was_kept_is_still_there_before_the_first_sample() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     bench.go(5000);
-    let kept = bench.encoder.kept();
-    let mut encoder = Encoder::new(Start::Kept(kept));
-    assert_eq!(encoder.kept(), kept, "before there are parameters");
+    let retained = bench.encoder.retained_state();
+    let mut encoder = Encoder::new(Start::Retained(retained));
+    assert_eq!(encoder.retained_state(), retained, "before there are parameters");
     encoder.apply(&bench.parameters);
-    assert_eq!(encoder.kept(), kept, "before there is a sample");
+    assert_eq!(encoder.retained_state(), retained, "before there is a sample");
 }
 
 #[test]
 fn damage_is_a_memory_error_and_an_alarm_where_a_position_is_lost() {
     for (kind, alarms) in [(SensorType::IncrementalCounted, ALARM_POSITION), (SensorType::SingleTurn, 0)] {
-        let lasting = Lasting::from_words([0, 0]);
-        let mut bench = Bench::started(one(kind), Start::Damaged(lasting), 0);
+        let record = PositionRecord::from_words([0, 0]);
+        let mut bench = Bench::started(one(kind), Start::Damaged(record), 0);
         let snapshot = bench.stay();
         assert_eq!((snapshot.alarms, snapshot.conditions.memory), (alarms, true));
     }

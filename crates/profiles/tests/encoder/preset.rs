@@ -1,4 +1,4 @@
-//! Presets, offsets, and what becomes of them.
+//! Presets and offsets, and their changes.
 
 use profiles::encoder::{CODE_SEQUENCE, Coding, Format, Parameters, Parity, SCALING, SensorType};
 
@@ -71,8 +71,8 @@ fn in_other_units_the_offset_is_gone() {
     }
 }
 
-/// Parameters that have nothing to do with units leave position, offset and speed alone: those of an incremental sensor
-/// cannot be found again.
+/// Parameters that do not concern units must leave position, offset and speed unchanged: an incremental encoder could
+/// not find its position again.
 #[test]
 fn other_parameters_leave_the_position() {
     let changes: [fn(&mut Parameters); 5] = [

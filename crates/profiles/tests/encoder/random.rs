@@ -1,12 +1,12 @@
-//! Anything at all: nothing overflows (tests run with overflow checks), and values stay in their ranges.
+//! Random inputs: nothing overflows (tests run with overflow checks), and values stay in their ranges.
 
 use profiles::board::{Board, RawEncoder, SsiFrame};
 use profiles::profile::Chain;
 use std::num::{NonZeroU16, NonZeroU32};
 
 use profiles::encoder::{
-    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Kept, Lasting, Limits, Module,
-    Parameters, Parity, SensorType, Start,
+    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Limits, Module, Parameters, Parity,
+    PositionRecord, RetainedState, SensorType, Start,
 };
 use proptest::prelude::*;
 
@@ -92,10 +92,11 @@ fn any_raw() -> impl Strategy<Value = RawEncoder> {
 }
 
 fn any_start() -> impl Strategy<Value = Start> {
-    let kept = any::<[u32; Kept::WORDS]>().prop_map(|words| Start::Kept(Kept::from_words(&words)));
-    let lost = any::<[u32; 2]>().prop_map(|words| Start::Lost(Lasting::from_words(words)));
-    let damaged = any::<[u32; 2]>().prop_map(|words| Start::Damaged(Lasting::from_words(words)));
-    prop_oneof![Just(Start::First), lost, damaged, kept]
+    let retained = any::<[u32; RetainedState::WORDS]>()
+        .prop_map(|words| Start::Retained(RetainedState::from_words(&words)));
+    let lost = any::<[u32; 2]>().prop_map(|words| Start::Lost(PositionRecord::from_words(words)));
+    let damaged = any::<[u32; 2]>().prop_map(|words| Start::Damaged(PositionRecord::from_words(words)));
+    prop_oneof![Just(Start::First), lost, damaged, retained]
 }
 
 proptest! {
@@ -115,12 +116,12 @@ proptest! {
                     prop_assert_eq!(values.cams & !own.cams.enable, 0);
                 }
             }
-            let kept = encoder.kept();
-            prop_assert_eq!(Kept::from_words(&kept.to_words()), kept);
+            let retained = encoder.retained_state();
+            prop_assert_eq!(RetainedState::from_words(&retained.to_words()), retained);
         }
     }
 
-    /// Whatever was kept, a start with it and with the same parameters keeps the same.
+    /// A start with any retained state and the same parameters retains the same state again.
     #[test]
     fn keeping_loses_nothing(parameters in any_parameters(), samples in prop::collection::vec(any_raw(), 0..20)) {
         let mut encoder = Encoder::default();
@@ -128,11 +129,12 @@ proptest! {
         for raw in samples {
             encoder.sample(&raw);
         }
-        let kept = encoder.kept();
-        let mut again = Encoder::new(Start::Kept(kept));
+        let retained = encoder.retained_state();
+        let mut again = Encoder::new(Start::Retained(retained));
         again.apply(&parameters);
-        for ((first, second), own) in kept.channels.iter().zip(again.kept().channels).zip(&parameters.channels) {
-            prop_assert!(*first == second || own.kind.is_none_or(|kind| !kind.is_kept()));
+        let both = retained.channels.iter().zip(again.retained_state().channels);
+        for ((first, second), own) in both.zip(&parameters.channels) {
+            prop_assert!(*first == second || own.kind.is_none_or(|kind| !kind.is_retained()));
         }
     }
 }

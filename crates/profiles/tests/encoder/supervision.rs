@@ -1,4 +1,4 @@
-//! Disturbed readings, alarms, warnings, and what is reported as an emergency.
+//! Disturbed readings, alarms, warnings, and faults that are reported as emergencies.
 
 use profiles::board::{Board, SsiFrame};
 use profiles::encoder::{
@@ -62,7 +62,7 @@ fn the_encoder_s_own_alarm_is_one() {
     assert_eq!(bench.receive(frame(3 << 1 | 1)).alarms, ALARM_POSITION);
 }
 
-/// After an outage the sensor may be further away: as far as it can have moved, and no step further.
+/// After an outage the sensor may be as far away as it can have moved, but not a step further.
 #[test]
 fn a_sensor_comes_back_from_where_it_can_have_moved() {
     for (moved, is_believed) in [(510_000, true), (510_001, false)] {
@@ -76,7 +76,7 @@ fn a_sensor_comes_back_from_where_it_can_have_moved() {
     }
 }
 
-/// However long the readings stay where the shaft cannot be, they are not taken over; a preset is a new reference.
+/// Implausible readings are rejected however long they last; a preset accepts them.
 #[test]
 fn a_jump_is_not_taken_over_until_it_is_back_or_the_position_is_preset() {
     for step in [0, 3, -700] {
@@ -106,7 +106,7 @@ fn a_jump_is_not_taken_over_until_it_is_back_or_the_position_is_preset() {
     }
 }
 
-/// Half a turn in a millisecond, of whatever sensor, with the parameters as delivered.
+/// With the parameters as delivered, half a turn in a millisecond is implausible for any sensor.
 #[test]
 fn the_fastest_movement_follows_from_the_resolution() {
     for (steps, fastest) in [(13, 1638), (10, 204), (17, 26_214), (2, 1)] {
@@ -122,7 +122,7 @@ fn the_fastest_movement_follows_from_the_resolution() {
     assert_eq!(rod.fastest, 20_000_000 / 4096, "20 m/s");
 }
 
-/// Too fast for the sensor is an error until something confirms the count.
+/// Movement too fast for the sensor is an error until the index confirms the count.
 #[test]
 fn a_count_that_was_too_fast_is_in_doubt_until_the_index_confirms_it() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
@@ -142,7 +142,7 @@ fn a_count_that_was_too_fast_is_in_doubt_until_the_index_confirms_it() {
 
 #[test]
 fn conditions_must_last_to_count_and_to_go() {
-    // At the limits is within them.
+    // A value at its limit is within the limits.
     let fine = Board { supply: Some(4500), current: Some(200), battery: Some(2400), ..Board::default() };
     let cases: [(Board, Conditions, u16); 5] = [
         (Board { supply: Some(4499), ..fine }, Conditions { voltage: true, ..Conditions::default() }, 0),
@@ -194,7 +194,7 @@ fn the_operating_time_warns_once_in_a_life_with_power() {
     assert_eq!(bench.stay().warnings, 0);
     bench.change(|parameters| parameters.limits.operating_time = 1);
     assert_eq!(bench.stay().warnings, 0, "only after power-on again");
-    let start = profiles::encoder::Start::Kept(bench.encoder.kept());
+    let start = profiles::encoder::Start::Retained(bench.encoder.retained_state());
     assert_eq!(Bench::started(bench.parameters, start, 0).stay().warnings, WARNING_OPERATING_TIME);
 }
 

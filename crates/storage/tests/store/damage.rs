@@ -1,13 +1,13 @@
-//! Flash content that no power cut explains: flipped bits, overwritten stretches, half erased and foreign pages.
-//! Whatever is read of a group must have been saved once, and must not claim to be newer than it is. Only the group whose
-//! record is damaged is affected.
+//! Flash content that no power cut explains: flipped bits, overwritten ranges, half erased and foreign pages. Every
+//! value read must have been saved once, and must not claim to be newer than it is. Only the group with the damaged
+//! record is affected.
 
 use std::cell::RefCell;
 
 use crate::model::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use storage::mock::{MockFlash, PowerCut};
-use storage::{Error, Group, Health, Loaded, Pages, Store, View};
+use storage::{Error, Health, Loaded, Pages, ParameterGroup, Store, View};
 
 const PAGES: Pages = Pages::new(0, 512);
 type Flash = MockFlash<256>;
@@ -32,9 +32,9 @@ impl Device {
         Device { flash, saves }
     }
 
-    /// All saves in one page, the other one is clean.
+    /// All saves are in one page, and the other page is clean.
     fn on_one_page() -> Device {
-        use Group::{Application, Calibration, Communication, Device as Identity};
+        use ParameterGroup::{Application, Calibration, Communication, Device as Identity};
         Device::new(vec![
             vec![
                 set(Identity, 1, 4),
@@ -49,10 +49,11 @@ impl Device {
         ])
     }
 
-    /// The same and so much more that the last saves are in the other page, with the old one not erased yet.
+    /// The same device with so many more saves that the last ones are in the other page; the old page is not erased
+    /// yet.
     fn just_moved() -> Device {
         let Device { mut saves, .. } = Device::on_one_page();
-        saves.extend((10..17).map(|version| vec![set(Group::Application, version, 34)]));
+        saves.extend((10..17).map(|version| vec![set(ParameterGroup::Application, version, 34)]));
         let device = Device::new(saves);
         assert!(device.flash.bytes()[512..].iter().any(|&byte| byte != 0xFF));
         device
@@ -62,26 +63,26 @@ impl Device {
         replay(&mut self.saves.iter())
     }
 
-    /// Damages a copy and checks what is read from it.
+    /// Damages a copy and checks the values read from it.
     fn check(&self, honest: bool, damage: impl FnOnce(&mut Flash)) -> [Health; 4] {
         let mut flash = self.flash.clone();
         damage(&mut flash);
         self.check_read(&mut flash, honest).1
     }
 
-    /// The same, and that a start mends it.
+    /// The same, with a check that a start repairs the store.
     fn check_and_mend(&self, honest: bool, damage: impl FnOnce(&mut Flash)) {
         let mut flash = self.flash.clone();
         damage(&mut flash);
         let (model, _) = self.check_read(&mut flash, honest);
-        let changes = vec![set(Group::Device, 77, 4)];
+        let changes = vec![set(ParameterGroup::Device, 77, 4)];
         start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
         assert_eq!(read_good(&mut flash, PAGES), after(&model, &changes), "mended");
     }
 
     fn check_read(&self, flash: &mut Flash, honest: bool) -> (Model, [Health; 4]) {
         let (model, health) = read(flash, PAGES);
-        for (value, group) in model.iter().zip(Group::ALL) {
+        for (value, group) in model.iter().zip(ParameterGroup::ALL) {
             let was_saved =
                 self.saves.iter().flatten().any(|(saved, state)| *saved == group && state == value);
             assert!(value.is_none() || was_saved, "{value:?} was never saved");
@@ -125,25 +126,25 @@ fn a_flipped_bit_in_the_newest_save_falls_back_to_the_one_before() {
     assert_eq!((model, health), (before, [Health::Good, Health::Good, Health::FellBack, Health::Good]));
 }
 
-/// Where the value of a save of one group is in the page, by its bytes.
-fn place(flash: &Flash, (_, value): &(Group, crate::model::Value)) -> usize {
+/// The place of a group's saved value in the page, found by its bytes.
+fn place(flash: &Flash, (_, value): &(ParameterGroup, crate::model::Value)) -> usize {
     let (_, value) = value.as_ref().unwrap();
     let bytes = flash.bytes();
     let mut found = (0..bytes.len()).filter(|&at| bytes[at..].starts_with(value));
     found.next_back().expect("it is stored")
 }
 
-/// What is to be said of the groups when a record of one of them is damaged.
-fn only(group: Group, health: Health) -> [Health; 4] {
-    Group::ALL.map(|other| if other == group { health } else { Health::Good })
+/// The expected health of all groups when a record of one group is damaged.
+fn only(group: ParameterGroup, health: Health) -> [Health; 4] {
+    ParameterGroup::ALL.map(|other| if other == group { health } else { Health::Good })
 }
 
-/// Every group and every kind of damage: the newest of several records, one that a newer one has replaced, and the only one.
-/// The other groups are saved together with it, before it and after it.
+/// Every group and every kind of damage: the newest of several records, an older record, and the only record. The other
+/// groups are saved together with the group, before it and after it.
 #[test]
 fn only_the_group_whose_record_is_damaged_is_affected() {
-    for group in Group::ALL {
-        let all = |version| Group::ALL.map(|group| set(group, version + group as u16, 12)).to_vec();
+    for group in ParameterGroup::ALL {
+        let all = |version| ParameterGroup::ALL.map(|group| set(group, version + group as u16, 12)).to_vec();
         for (saves, damaged, expected) in [
             (vec![all(10), vec![set(group, 20, 12)]], set(group, 20, 12), Health::FellBack),
             (vec![all(10), all(20)], set(group, 20 + group as u16, 12), Health::FellBack),
@@ -162,7 +163,9 @@ fn only_the_group_whose_record_is_damaged_is_affected() {
                     flash.disturb(at, |byte| byte ^ 1 << bit);
                     let (model, health) = read(&mut flash, PAGES);
                     assert_eq!(health, only(group, expected), "{group:?}, byte {byte}, bit {bit}");
-                    for (other, (value, newest)) in Group::ALL.into_iter().zip(model.iter().zip(&newest)) {
+                    for (other, (value, newest)) in
+                        ParameterGroup::ALL.into_iter().zip(model.iter().zip(&newest))
+                    {
                         let is_newest = other != group || expected == Health::Good;
                         assert_eq!(
                             value == newest,
@@ -176,11 +179,12 @@ fn only_the_group_whose_record_is_damaged_is_affected() {
     }
 }
 
-/// A bit of what holds the records together (marks, heads and commit words of the transactions) is nobody's: nothing is lost.
+/// A damaged bit outside of the records (in marks, heads and commit words of the transactions) belongs to no group:
+/// nothing is lost.
 #[test]
 fn a_flipped_bit_between_the_records_costs_nothing() {
     let device = Device::on_one_page();
-    // The first transaction: clean, left, begin and contents before the records.
+    // The part before the records of the first transaction: clean, left, begin and contents.
     let before_the_records = 0..16;
     let end = device.flash.bytes()[..512].iter().rposition(|&byte| byte != 0xFF).unwrap();
     for byte in before_the_records.chain(end - 7..=end) {
@@ -209,7 +213,7 @@ fn an_overwritten_stretch_is_noticed_or_harmless() {
                 1 => 0x00,
                 _ => 0xFF,
             };
-            // Cells that return to the erased value look like a save that was cut: older, but still whole.
+            // Cells that return to the erased value look like a save that was cut: the values are older but whole.
             device.check_and_mend(seed % 3 != 2, |flash| {
                 (at..1024.min(at + len))
                     .enumerate()
@@ -247,7 +251,7 @@ fn foreign_pages_are_reported_and_replaced() {
         let mut flash = Flash::new(1024, 1);
         (0..1024).for_each(|at| flash.disturb(at, |_| content[at]));
         assert_eq!(read(&mut flash, PAGES), (EMPTY, [expected; 4]));
-        let changes = vec![set(Group::Device, 1, 4)];
+        let changes = vec![set(ParameterGroup::Device, 1, 4)];
         start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
         assert_eq!(read_good(&mut flash, PAGES), after(&EMPTY, &changes));
     }
@@ -255,13 +259,13 @@ fn foreign_pages_are_reported_and_replaced() {
 
 #[test]
 fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
-    let first = vec![set(Group::Device, 1, 4)];
+    let first = vec![set(ParameterGroup::Device, 1, 4)];
     let page = Device::new(vec![first.clone()]).flash.bytes();
-    let copy = vec![(Group::Application, Some((3, page[8..100].to_vec())))];
-    let device = Device::new(vec![first, vec![set(Group::Device, 2, 4)], copy]);
+    let copy = vec![(ParameterGroup::Application, Some((3, page[8..100].to_vec())))];
+    let device = Device::new(vec![first, vec![set(ParameterGroup::Device, 2, 4)], copy]);
     let before = replay(&mut device.saves[..2].iter());
-    // The copying save begins behind one that names every group and one of a single record. With its contents and the head of
-    // its record damaged the search for the next one enters the value.
+    // The save with the copy follows one that names every group and one with a single record. With its contents and the
+    // head of its record damaged, the search for the next record enters the value.
     let copying = 8 + (8 + 16 + 3 * 12 + 8) + (8 + 16 + 8);
     for at in copying + 4..copying + 8 {
         let mut flash = device.flash.clone();
@@ -280,7 +284,7 @@ fn a_length_that_leads_out_of_the_page_is_damage() {
     let room = (512 - 8 - 5 * 4) / 4;
     for words in (room + 1..room + 10).chain([1000, u16::MAX]) {
         let mut flash = device.flash.clone();
-        // The contents of the first transaction, beside their complement.
+        // The contents of the first transaction, with their complement.
         let head = [words.to_le_bytes(), (!words).to_le_bytes()].concat();
         (512 + 12..).zip(head).for_each(|(at, to)| flash.disturb(at, |_| to));
         assert_eq!(read(&mut flash, PAGES).0, device.newest());
@@ -293,7 +297,7 @@ fn what_the_start_has_found_is_told_after_it_was_mended_too() {
     let mut flash = device.flash.clone();
     flash.disturb(24, |byte| byte ^ 1);
     let store = start(&mut flash, PAGES).unwrap();
-    let health = Group::ALL.map(|group| store.health(group));
+    let health = ParameterGroup::ALL.map(|group| store.health(group));
     assert_eq!(health, [Health::Lost, Health::Good, Health::Good, Health::Good]);
     assert_eq!(read(&mut flash, PAGES).1, [Health::Good; 4], "the next start finds nothing");
 }
@@ -309,7 +313,7 @@ fn the_closing_mark_of_a_move_is_not_needed_once_the_old_page_says_that_it_was_l
     assert_eq!(health, [Health::Good; 4]);
 }
 
-/// A flash that the test can reach while a store has it.
+/// A flash that the test can access while a store uses it.
 struct Shared<'a>(&'a RefCell<Flash>);
 
 impl ErrorType for Shared<'_> {
@@ -345,13 +349,18 @@ impl NorFlash for Shared<'_> {
 fn a_value_that_decays_while_the_store_runs_is_neither_read_nor_moved() {
     let flash = RefCell::new(Flash::new(1024, 1));
     let mut store = View::open(Shared(&flash), PAGES).and_then(Store::prepare).unwrap();
-    store.save(&as_changes(&vec![set(Group::Device, 1, 4), set(Group::Communication, 2, 300)])).unwrap();
+    store
+        .save(&as_changes(&vec![
+            set(ParameterGroup::Device, 1, 4),
+            set(ParameterGroup::Communication, 2, 300),
+        ]))
+        .unwrap();
     flash.borrow_mut().disturb(100, |byte| byte ^ 4);
-    assert_eq!(store.load(Group::Communication, &mut [0; 300]), Err(Error::Corrupt));
-    assert_eq!(store.load(Group::Device, &mut [0; 4]), Ok(Some(Loaded { version: 1, len: 4 })));
+    assert_eq!(store.load(ParameterGroup::Communication, &mut [0; 300]), Err(Error::Corrupt));
+    assert_eq!(store.load(ParameterGroup::Device, &mut [0; 4]), Ok(Some(Loaded { version: 1, len: 4 })));
     let before = flash.borrow().programmed();
-    // Does not fit the page any more, so it would take the decayed groups along.
-    let moving = store.save(&as_changes(&vec![set(Group::Application, 3, 124)]));
+    // The save does not fit the page any more, so it would move the decayed groups too.
+    let moving = store.save(&as_changes(&vec![set(ParameterGroup::Application, 3, 124)]));
     assert_eq!(moving, Err(Error::Corrupt));
     assert_eq!(flash.borrow().programmed(), before);
 }

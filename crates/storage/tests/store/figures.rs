@@ -1,29 +1,29 @@
-//! The figures that the documentation of the crate states: `cargo test -p storage --test store -- --nocapture figures`
+//! The figures in the documentation of the crate: `cargo test -p storage --test store -- --nocapture figures`
 
 use crate::model::{Changes, as_changes, set, start};
 use storage::mock::MockFlash;
-use storage::{Group, MAX_VALUE, Pages};
+use storage::{MAX_VALUE, Pages, ParameterGroup};
 
 const PAGE: usize = 16 * 1024;
 const PAGES: Pages = Pages::new(0, 16 * 1024);
 /// Guaranteed erase cycles of a sector (STM32F446 datasheet, flash memory endurance).
 const ENDURANCE: usize = 10_000;
-/// Programming time of a word in microseconds, typical and most (same datasheet, flash memory programming, x32).
+/// Programming time of a word in microseconds, typical and maximum (same datasheet, flash memory programming, x32).
 const WORD_US: [f64; 2] = [16.0, 100.0];
 
 fn blank() -> MockFlash<PAGE> {
     MockFlash::new(2 * PAGE, 0)
 }
 
-/// Sizes of the groups that are saved at once.
-type Sizes = [(Group, usize)];
+/// Groups and sizes of the values that are saved at once.
+type Sizes = [(ParameterGroup, usize)];
 
-/// The save of that number: no value is that of the save before.
+/// The changes of save `number`: every value differs from that of the save before.
 fn changes(sizes: &Sizes, number: usize) -> Changes {
     sizes.iter().map(|&(group, len)| set(group, number as u16, len)).collect()
 }
 
-/// Saves that fit between two starts, when both pages are empty at the first.
+/// Number of saves that fit between two starts, if both pages are empty at the first.
 fn saves_without_restart(sizes: &Sizes) -> usize {
     let mut flash = blank();
     let mut store = start(&mut flash, PAGES).unwrap();
@@ -48,12 +48,12 @@ fn words_of_saves(sizes: &Sizes, count: usize) -> Vec<u32> {
 
 #[test]
 fn saves_until_a_restart_and_until_worn_out() {
-    let largest = Group::ALL.map(|group| (group, MAX_VALUE));
+    let largest = ParameterGroup::ALL.map(|group| (group, MAX_VALUE));
     let sets: [(&str, &Sizes, usize); 3] = [
-        ("application group, 212 B", &[(Group::Application, 212)], 136),
+        ("application group, 212 B", &[(ParameterGroup::Application, 212)], 136),
         (
             "communication and application groups, 1405 B",
-            &[(Group::Communication, 1193), (Group::Application, 212)],
+            &[(ParameterGroup::Communication, 1193), (ParameterGroup::Application, 212)],
             22,
         ),
         ("all four groups at their most, 8192 B", &largest, 2),

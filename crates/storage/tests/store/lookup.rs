@@ -1,8 +1,8 @@
-//! The device record as a bootloader finds it, beside what the store says.
+//! The device record found by the bootloader's search, compared with the store.
 
 use crate::model::{as_changes, noise, set, start};
 use storage::mock::{MockFlash, Weak};
-use storage::{Change, DeviceRecord, Group, Pages, device_record};
+use storage::{Change, DeviceRecord, Pages, ParameterGroup, device_record};
 
 const PAGES: Pages = Pages::new(0, 512);
 type Flash = MockFlash<512, 4>;
@@ -14,32 +14,37 @@ fn record(node_id: u8) -> DeviceRecord {
 fn save(flash: &mut Flash, node_id: u8) -> bool {
     let value = record(node_id).encode();
     let Ok(mut store) = start(flash, PAGES) else { return false };
-    store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value: &value }]).is_ok()
+    store
+        .save(&[Change::Set { group: ParameterGroup::Device, version: DeviceRecord::VERSION, value: &value }])
+        .is_ok()
 }
 
 #[test]
 fn there_is_none_where_none_was_saved() {
     let mut flash = Flash::new(1024, 0);
     assert_eq!(device_record(&mut flash, PAGES), None);
-    start(&mut flash, PAGES).unwrap().save(&as_changes(&vec![set(Group::Application, 1, 8)])).unwrap();
+    start(&mut flash, PAGES)
+        .unwrap()
+        .save(&as_changes(&vec![set(ParameterGroup::Application, 1, 8)]))
+        .unwrap();
     assert_eq!(device_record(&mut flash, PAGES), None);
     assert_eq!(device_record(&mut flash, Pages::new(0, 4096)), None, "pages beyond the flash");
 }
 
-/// Through many moves from page to page.
+/// The record is found through many moves from page to page.
 #[test]
 fn it_is_the_one_that_was_saved_last() {
     let mut flash = Flash::new(1024, 0);
     for round in 1..=120 {
         assert!(save(&mut flash, round));
         let value = noise(u64::from(round), 40);
-        let change = Change::Set { group: Group::Application, version: 1, value: &value };
+        let change = Change::Set { group: ParameterGroup::Application, version: 1, value: &value };
         start(&mut flash, PAGES).unwrap().save(&[change]).unwrap();
         assert_eq!(device_record(&mut flash, PAGES), Some(record(round)));
     }
 }
 
-/// Whatever the store says after a cut, the bootloader says the same once the store has started.
+/// After a cut, the bootloader finds the same record as the store, once the store has started.
 #[test]
 fn after_a_cut_it_is_the_old_or_the_new_one_and_what_the_store_says_later() {
     let mut cuts = 0;
@@ -66,7 +71,7 @@ fn after_a_cut_it_is_the_old_or_the_new_one_and_what_the_store_says_later() {
     assert!(cuts > 500);
 }
 
-/// A bit that flips costs the newest record at most; what is found was saved once.
+/// A flipped bit costs the newest record at most; every record found was saved once.
 #[test]
 fn a_bit_that_flips_makes_no_record_that_was_never_saved() {
     let mut flash = Flash::new(1024, 0);

@@ -1,4 +1,4 @@
-//! The store on mock flashes, beside a plain model of what should be stored.
+//! Tests of the store on mock flashes, compared with a plain model of the stored values.
 
 mod damage;
 mod figures;

@@ -1,21 +1,21 @@
-//! The plain model that the store is compared with, and what runs both.
+//! The plain model of the store, and functions that run both.
 
 use storage::mock::{MockFlash, PowerCut};
-use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
+use storage::{Change, Error, Health, MAX_VALUE, Pages, ParameterGroup, Store, View};
 
 /// A version and a value, or nothing.
 pub(crate) type Value = Option<(u16, Vec<u8>)>;
 
-/// What should be stored, in the order of [`Group::ALL`].
+/// The values that should be stored, in the order of [`ParameterGroup::ALL`].
 pub(crate) type Model = [Value; 4];
 
-/// What a save changes.
-pub(crate) type Changes = Vec<(Group, Value)>;
+/// The changes of a save.
+pub(crate) type Changes = Vec<(ParameterGroup, Value)>;
 
 /// Nothing stored.
 pub(crate) const EMPTY: Model = [None, None, None, None];
 
-/// One thing that a device does.
+/// One action of a device.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// One save.
@@ -25,12 +25,12 @@ pub(crate) enum Step {
 }
 
 /// Sets a group to `len` bytes of noise.
-pub(crate) fn set(group: Group, version: u16, len: usize) -> (Group, Value) {
+pub(crate) fn set(group: ParameterGroup, version: u16, len: usize) -> (ParameterGroup, Value) {
     (group, Some((version, noise(u64::from(version), len))))
 }
 
 /// Restores the defaults of a group.
-pub(crate) fn restore(group: Group) -> (Group, Value) {
+pub(crate) fn restore(group: ParameterGroup) -> (ParameterGroup, Value) {
     (group, None)
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
 pub(crate) fn after(model: &Model, changes: &Changes) -> Model {
     let mut model = model.clone();
     for (group, value) in changes {
-        let place = Group::ALL.iter().position(|g| g == group).unwrap();
+        let place = ParameterGroup::ALL.iter().position(|g| g == group).unwrap();
         model[place].clone_from(value);
     }
     model
@@ -55,28 +55,28 @@ pub(crate) fn as_changes(changes: &Changes) -> Vec<Change<'_>> {
     changes.iter().map(as_change).collect()
 }
 
-fn as_change((group, value): &(Group, Value)) -> Change<'_> {
+fn as_change((group, value): &(ParameterGroup, Value)) -> Change<'_> {
     match value {
         Some((version, value)) => Change::Set { group: *group, version: *version, value },
         None => Change::Restore(*group),
     }
 }
 
-/// What the flash holds, and how far it is to be trusted.
+/// The stored values, and their health.
 pub(crate) fn read<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
 ) -> (Model, [Health; 4]) {
     let mut view = View::open(flash, pages).unwrap();
-    let value = Group::ALL.map(|group| {
+    let value = ParameterGroup::ALL.map(|group| {
         let mut buf = [0; MAX_VALUE];
         let loaded = view.load(group, &mut buf).unwrap()?;
         Some((loaded.version, buf[..loaded.len].to_vec()))
     });
-    (value, Group::ALL.map(|group| view.health(group)))
+    (value, ParameterGroup::ALL.map(|group| view.health(group)))
 }
 
-/// What the flash holds when nothing may be doubtful.
+/// The stored values, in a flash in which nothing may be doubtful.
 pub(crate) fn read_good<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -86,8 +86,8 @@ pub(crate) fn read_good<const ERASE: usize, const WORD: usize>(
     model
 }
 
-/// Opens and prepares the store and takes the steps. Returns the states that the flash may be in then: one, or two
-/// when the power was cut in a save.
+/// Opens and prepares the store and takes the steps. Returns the states that the flash may then be in: one, or two if
+/// the power was cut during a save.
 pub(crate) fn run<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -115,7 +115,7 @@ pub(crate) fn run<const ERASE: usize, const WORD: usize>(
     vec![model]
 }
 
-/// Start-up, unless the power is cut.
+/// Starts the store, unless the power is cut.
 pub(crate) fn start<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -127,7 +127,8 @@ pub(crate) fn start<const ERASE: usize, const WORD: usize>(
     }
 }
 
-/// Power comes back: one of the `allowed` states is read, `prepare` keeps it, and it is read ever after.
+/// Restores the power: one of the `allowed` states must be read, `prepare` must keep it, and all later reads must
+/// return it.
 pub(crate) fn recover<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,

@@ -1,13 +1,13 @@
-//! The power is cut at every single operation of a long scenario, and again at every operation of the recovery; on a flash
-//! that programs words of four bytes, as the STM32F4 does, and on one that programs words of eight, as the STM32G4 and L4 do.
+//! Power cuts at every single operation of a long scenario, and again at every operation of the recovery; on a flash
+//! that programs words of four bytes (STM32F4), and on one that programs words of eight (STM32G4, L4).
 
 use crate::model::{
     EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start,
 };
 use storage::mock::{MockFlash, Weak};
-use storage::{Group, Pages};
+use storage::{Pages, ParameterGroup};
 
-/// Small pages make page moves frequent; two erase units a page make erases that are cut between units.
+/// Small pages make page moves frequent. With two erase units per page, an erase can be cut between the units.
 const fn pages(word: usize) -> Pages {
     Pages::new(256, 256).with_words(word as u32)
 }
@@ -21,7 +21,7 @@ fn flash<const WORD: usize>(seed: u64) -> Flash<WORD> {
 
 /// Saves of one and of several groups, of empty values, restores, both pages filled, and restarts that erase.
 fn scenario() -> Vec<Step> {
-    use Group::{Application, Calibration, Communication, Device};
+    use ParameterGroup::{Application, Calibration, Communication, Device};
     let save = |changes: &[_]| Step::Save(changes.to_vec());
     vec![
         save(&[set(Device, 1, 4)]),
@@ -57,7 +57,7 @@ fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model<const WORD: 
     assert!(flash.erases()[2..6].iter().all(|&erases| erases >= 2), "{:?}", flash.erases());
 }
 
-/// Every state of flash that a cut in the scenario can leave, with the states that may be read from it.
+/// Every state of the flash that a cut in the scenario can leave, with the states that may be read.
 fn cut_everywhere<const WORD: usize>(mut check: impl FnMut(Flash<WORD>, Vec<Model>)) -> u32 {
     let total = operations_of(|flash| drop(run(flash, pages(WORD), &scenario(), EMPTY)), &flash::<WORD>(0));
     for operation in 0..total {
@@ -77,7 +77,7 @@ fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on<co
     let total = cut_everywhere::<WORD>(|mut flash, allowed| {
         let model = recover(&mut flash, pages(WORD), &allowed);
         news += u32::from(allowed.len() == 2 && model == allowed[0]);
-        let changes = vec![set(Group::Communication, 99, 21), restore(Group::Device)];
+        let changes = vec![set(ParameterGroup::Communication, 99, 21), restore(ParameterGroup::Device)];
         start(&mut flash, pages(WORD)).unwrap().save(&as_changes(&changes)).unwrap();
         assert_eq!(read_good(&mut flash, pages(WORD)), after(&model, &changes));
     });
@@ -106,7 +106,10 @@ fn a_dozen_cuts_in_a_row_lose_nothing<const WORD: usize>() {
         let mut flash = flash::<WORD>(seed);
         let mut model = EMPTY;
         for round in 0..12 {
-            let changes = vec![set(Group::Device, round, 4), set(Group::Application, round + 100, 30)];
+            let changes = vec![
+                set(ParameterGroup::Device, round, 4),
+                set(ParameterGroup::Application, round + 100, 30),
+            ];
             let steps = [Step::Save(changes.clone()), Step::Restart, Step::Save(changes)];
             let at = noise(seed * 100 + u64::from(round), 1)[0];
             flash.cut_after(u32::from(at) % 60, Weak::Random);

@@ -1,21 +1,21 @@
-//! Random lives of a device against the model; proptest shrinks what fails. The seed is fixed.
+//! Random histories of a device, compared with the model; proptest shrinks failures. The seed is fixed.
 
 use crate::model::{Changes, EMPTY, Step, noise, recover, run};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use storage::mock::{MockFlash, Weak};
-use storage::{Group, Pages};
+use storage::{Pages, ParameterGroup};
 
 const fn pages(word: usize) -> Pages {
     Pages::new(512, 512).with_words(word as u32)
 }
 
-/// What a device does until the power is cut, when, and how the weak bits read then.
+/// The steps of a device until the power cut, the operation of the cut, and how weak bits read afterwards.
 type Life = (Vec<Step>, u32, Weak);
 
 fn changes() -> impl Strategy<Value = Changes> {
-    let group = prop::sample::select(Group::ALL.to_vec());
+    let group = prop::sample::select(ParameterGroup::ALL.to_vec());
     let value = prop::option::weighted(0.8, (any::<u16>(), 0_usize..120));
     let value = value.prop_map(|value| value.map(|(version, len)| (version, noise(len as u64, len))));
     vec((group, value), 1..4)

@@ -1,4 +1,4 @@
-//! A small node with sectors of different sizes, images for it, and what bootloader and master do with them.
+//! A small node with sectors of different sizes, images for it, and the actions of bootloader and master.
 
 use std::sync::LazyLock;
 
@@ -25,7 +25,7 @@ pub(crate) fn keys() -> salty::Keypair {
     key_number(0)
 }
 
-/// One of the two.
+/// One of the two keys.
 pub(crate) fn key_number(number: u8) -> salty::Keypair {
     salty::Keypair::from(&[7 + number; 32])
 }
@@ -38,7 +38,7 @@ pub(crate) fn target() -> Target {
     Target { layout, product: PRODUCT, hardware: REVISION, keys: &*PUBLIC_KEYS }
 }
 
-/// A header and its code, as far as they make sense; [`Image::bytes`] is what goes over the bus.
+/// A header and its code, as consistent as the test needs; [`Image::bytes`] are the bytes sent over the bus.
 #[derive(Clone)]
 pub(crate) struct Image {
     pub(crate) header: Header,
@@ -80,7 +80,7 @@ impl Image {
     }
 }
 
-/// The images of most tests: their lengths end within a chunk, and within different sectors.
+/// The images of most tests. Their lengths end within a chunk, and within different sectors.
 pub(crate) fn image_a() -> Image {
     Image::new(description(1, 5), 404)
 }
@@ -89,18 +89,18 @@ pub(crate) fn image_b() -> Image {
     Image::new(description(2, 5), 620)
 }
 
-/// `len` bytes that look random and are the same each time.
+/// `len` pseudo-random bytes, the same each time.
 pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(seed);
     (0..len).map(|_| random.u8(..)).collect()
 }
 
-/// A number that looks random and is the same each time.
+/// A pseudo-random number, the same each time.
 pub(crate) fn chance(seed: u32) -> u32 {
     u32::from_le_bytes(noise(u64::from(seed), 4).try_into().unwrap())
 }
 
-/// Whether all is to be tried: `cargo xtask test --thorough` sets THOROUGH=1.
+/// Whether all cases are to be tested: `cargo xtask test --thorough` sets THOROUGH=1.
 pub(crate) fn is_thorough() -> bool {
     std::env::var("THOROUGH").is_ok_and(|value| value == "1")
 }
@@ -110,7 +110,7 @@ pub(crate) fn flash_with(image: &Image, seed: u64) -> MockFlash {
     flash_of_words_with(image, 4, seed)
 }
 
-/// The same on a flash that programs words of so many bytes.
+/// The same with a flash that programs words of `word` bytes.
 pub(crate) fn flash_of_words_with(image: &Image, word: usize, seed: u64) -> MockFlash {
     let mut flash = MockFlash::with_words(&SECTORS, word, seed);
     update(&mut flash, &image.bytes()).unwrap();
@@ -132,7 +132,7 @@ fn outcome(updater: &mut Updater<&mut MockFlash>) -> Result<(), Refusal> {
     if updater.status() == Status::GOOD { Ok(()) } else { Err(Refusal::Unspecified) }
 }
 
-/// What a master does up to the end of the download, in pieces of odd sizes.
+/// Actions of a master up to the end of the download, in pieces of odd sizes.
 pub(crate) fn download(updater: &mut Updater<&mut MockFlash>, image: &[u8]) -> Result<(), Refusal> {
     updater.clear()?;
     run(updater)?;
@@ -181,17 +181,17 @@ pub(crate) fn revert(flash: &mut MockFlash) -> Result<(), Refusal> {
     run(&mut updater)
 }
 
-/// The application says that it is well.
+/// Confirms the application.
 pub(crate) fn confirm(flash: &mut MockFlash) {
     Trial::confirm(flash, &target().layout).unwrap();
 }
 
-/// What the bootloader does at a start that was asked for: the decision, after a copy that was left to do.
+/// A requested start of the bootloader: the decision, after a copy that was still to be done.
 pub(crate) fn start(flash: &mut MockFlash) -> Decision {
     start_after(flash, Reset::Asked)
 }
 
-/// The same at a start after this reset.
+/// The same for a start after this reset.
 pub(crate) fn start_after(flash: &mut MockFlash, reset: Reset) -> Decision {
     // A refusal shows in the next decision.
     let _ = match boot(flash, &target(), Start { reset, ..Start::default() }) {
@@ -208,7 +208,7 @@ pub(crate) fn holds(flash: &MockFlash, image: &Image) -> bool {
     flash.bytes()[APPLICATION..APPLICATION + bytes.len()] == bytes
 }
 
-/// Asserts that `image` starts, all of it.
+/// Asserts that `image` starts and is complete.
 pub(crate) fn assert_starts(flash: &mut MockFlash, image: &Image) {
     assert_eq!(start(flash), Decision::Start(image.header));
     assert!(holds(flash, image), "the code too");

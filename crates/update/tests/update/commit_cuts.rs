@@ -1,10 +1,11 @@
-//! Cuts in the words that decide, each followed by cuts in the recovery: what reads well once may not do so again.
+//! Cuts in the words that decide, each followed by cuts in the recovery: a word that reads well once may not do so
+//! again.
 
 use crate::bench::{Image, description, flash_of_words_with, holds, install, stage, start};
 use update::Decision;
 use update::mock::{MockFlash, Weak};
 
-/// Images of one word of code: few operations, so many pairs of cuts.
+/// Images of one word of code, with few operations and so with few pairs of cuts to try.
 fn image(version: u16) -> Image {
     Image::new(description(version, 5), 4)
 }
@@ -15,15 +16,15 @@ fn operations(flash: &MockFlash, act: impl FnOnce(&mut MockFlash) -> bool) -> u3
     after.operations() - flash.operations()
 }
 
-/// Whole, whichever it is.
+/// Asserts that one of the images starts, and that it is complete.
 fn assert_whole(flash: &mut MockFlash, images: &[Image]) {
     let decision = start(flash);
     let whole = images.iter().any(|image| decision == Decision::Start(image.header) && holds(flash, image));
     assert!(whole, "{decision:?}");
 }
 
-/// Cuts `act` in `operation`, in every way, then the recovery at its start, at its end and here and there, in every way.
-/// Whatever starts is one of the `images`, and so it is at each start after. Returns the number of pairs.
+/// Cuts `act` in `operation`, in every way, then cuts the recovery at its start, at its end and in between, in every
+/// way. The image that starts is one of `images`, and the same at each later start. Returns the number of pairs.
 fn cut_twice(
     flash: &MockFlash,
     act: impl Fn(&mut MockFlash) -> bool,
@@ -114,7 +115,7 @@ fn cuts_around_the_mark_that_the_copy_is_done_of(word: usize, at_least: u32) {
     assert!(pairs > at_least);
 }
 
-/// An image that was committed and not copied is cleared for the next one.
+/// An image that was committed but not copied is cleared for the next one.
 #[test]
 fn cuts_in_the_clear_of_a_committed_image() {
     cuts_in_the_clear_of_a_committed_image_of(4, 300);

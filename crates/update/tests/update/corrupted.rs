@@ -6,19 +6,19 @@ use crate::bench::{
 };
 use update::{Area, CONTEXT, Description, Refusal, SIGNED_LEN, Status, Updater};
 
-/// A kind of bad image: what it is, its bytes, the code that 1F57h reads.
+/// A kind of bad image: its description, its bytes, and the code in 1F57h.
 type Kind = (&'static str, Vec<u8>, Refusal);
 
 const S: usize = SIGNED_LEN + 32;
 
-/// B with other bytes, as they are.
+/// B with changed bytes and nothing corrected.
 fn bytes(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut bytes = image_b().bytes();
     change(&mut bytes);
     bytes
 }
 
-/// B with another header, the CRC of which is right again: what somebody does who has no key.
+/// B with a changed header and a corrected CRC: a forgery without the key.
 fn header(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     bytes(|bytes| {
         change(bytes);
@@ -31,7 +31,7 @@ fn crc_of(bytes: &[u8]) -> u32 {
     crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
 }
 
-/// B for another device or of another time, signed as it should be.
+/// B for another device or of another time, with a valid signature.
 fn signed(change: impl FnOnce(&mut Description)) -> Vec<u8> {
     let mut about = description(2, 5);
     change(&mut about);
@@ -154,7 +154,7 @@ fn signatures() -> Vec<Kind> {
     all.map(|(name, bytes)| (name, bytes, Refusal::Signature)).to_vec()
 }
 
-/// Adds the order of the base point: another number that means the same.
+/// Adds the order of the base point, which gives an equivalent number.
 fn add_order(s: &mut [u8]) {
     const ORDER: [u8; 32] = [
         0xED, 0xD3, 0xF5, 0x5C, 0x1A, 0x63, 0x12, 0x58, 0xD6, 0x9C, 0xF7, 0xA2, 0xDE, 0xF9, 0xDE, 0x14, 0, 0,

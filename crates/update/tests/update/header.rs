@@ -1,4 +1,4 @@
-//! The header in bytes and back.
+//! Encoding and parsing of the header.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -59,7 +59,7 @@ fn a_wrong_crc_is_told_from_a_wrong_content() {
     });
 }
 
-/// Whatever is accepted, with a good CRC over anything, is what the parsed value encodes to: nothing is left open.
+/// Any accepted bytes, with a valid CRC over random content, equal the encoding of the parsed value.
 #[test]
 fn what_is_parsed_encodes_to_the_same_bytes() {
     let words = prop::collection::vec((0..HEADER_LEN / 4 - 1, any::<[u8; 4]>()), 0..3);
@@ -86,7 +86,7 @@ fn noise_is_no_header() {
     });
 }
 
-/// The layout that docs/update.md prints.
+/// The layout printed in docs/update.md.
 #[test]
 fn the_fields_are_where_the_table_says() {
     let version = Version { major: 0x0102, minor: 0x0304, patch: 0x0506 };
@@ -105,7 +105,7 @@ fn the_fields_are_where_the_table_says() {
     assert_eq!(version.to_string(), "258.772.1286");
 }
 
-/// The check value of CRC-32/ISO-HDLC (catalogue of parametrised CRC algorithms), of a message of whole words.
+/// The check value of CRC-32/ISO-HDLC (catalogue of parametrised CRC algorithms), for a message of whole words.
 #[test]
 fn the_crc_is_the_one_of_zip() {
     let about = Description::default();

@@ -1,4 +1,4 @@
-//! Updates without accidents, commands in the wrong order, decisions at a start, and a flash that wears out.
+//! Updates without accidents, commands in the wrong order, decisions at a start, and a worn-out flash.
 
 use crate::bench::{
     APPLICATION, HEADER, Image, STAGING, assert_starts, confirm, description, download, flash_with, holds,
@@ -183,7 +183,7 @@ fn the_security_counter_may_grow_or_stay_and_never_goes_back() {
     assert_starts(&mut flash, &with(6, 9));
 }
 
-/// No damage of the application lowers the security counter that one image has reached.
+/// No damage of the application lowers the security counter that an image has reached.
 #[test]
 fn the_security_counter_outlives_the_application() {
     let with = |version, counter| Image::new(description(version, counter), 100);
@@ -193,14 +193,15 @@ fn the_security_counter_outlives_the_application() {
     flash.disturb(APPLICATION + 40, |byte| byte ^ 8);
     assert!(update(&mut flash, &with(2, 4).bytes()).is_err());
     assert_eq!(start(&mut flash), Decision::Stay(Stay::NoProgram(Refusal::HeaderCrc)));
-    // Nor does a debugger, or whoever programs the application area.
+    // Nor does a debugger, or another way to program the application area.
     put(&mut flash, &with(2, 4));
     assert_eq!(start(&mut flash), Decision::Stay(Stay::NoProgram(Refusal::Counter { least: 5 })));
     update(&mut flash, &with(3, 5).bytes()).unwrap();
     assert_starts(&mut flash, &with(3, 5));
 }
 
-/// The counter is kept before the bootloader takes the next download, also when the application was told to enter the bootloader.
+/// The counter is recorded before the bootloader takes the next download, also if the application was told to enter the
+/// bootloader.
 #[test]
 fn the_counter_is_kept_before_the_application_can_be_replaced() {
     let with = |version, counter| Image::new(description(version, counter), 100);
@@ -213,7 +214,7 @@ fn the_counter_is_kept_before_the_application_can_be_replaced() {
     assert!(update(&mut flash, &with(2, 4).bytes()).is_err());
 }
 
-/// Only of an application that is signed: else a header by hand would lock the node for good.
+/// The counter is recorded for a signed application only: otherwise a forged header would lock the node for good.
 #[test]
 fn the_counter_of_an_application_that_nobody_has_signed_is_not_kept() {
     let mut flash = flash_with(&image_a(), 1);
@@ -242,7 +243,7 @@ fn either_key_signs_and_one_revokes_the_other_for_good() {
     }
     confirm(&mut flash);
     assert_starts(&mut flash, &by_key(4, 1, 1));
-    // From that start of the fourth on, the first key is none any more, whatever becomes of that image.
+    // From the start of the fourth image on, the first key is revoked, whatever happens to that image.
     for image in [by_key(3, 0, 0), by_key(5, 0, 2)] {
         assert!(update(&mut flash, &image.bytes()).is_err());
         put(&mut flash, &image);
@@ -269,7 +270,7 @@ fn an_application_that_keeps_crashing_keeps_the_node_in_the_bootloader() {
     assert_eq!(after(crashes.confirmed()), Decision::Start(image_a().header));
 }
 
-/// A flash in which one word keeps a bit that should be programmed, or one sector does not erase.
+/// A flash with one word in which a bit cannot be programmed, or with one sector that cannot be erased.
 struct Worn {
     flash: MockFlash,
     word: u32,
@@ -310,7 +311,7 @@ impl Flash for Worn {
     }
 }
 
-/// An update to B on a worn flash, as far as it goes.
+/// An update to B on a worn flash, as far as possible.
 fn update_worn(worn: &mut Worn) -> Status {
     let mut updater = Updater::new(worn, target(), Status::GOOD);
     let poll = |updater: &mut Updater<&mut Worn>| while updater.poll() != Next::Nothing {};
@@ -369,7 +370,8 @@ fn downloads_one_after_the_other_need_no_restart() {
     assert_starts(&mut flash, &image_b());
 }
 
-/// Whoever has put it there: code and header are whole, all sums are right, and nobody has signed it.
+/// Code and header are complete and all sums are right, but the image is not signed. Such an application is refused
+/// however it got there.
 #[test]
 fn an_application_that_nobody_has_signed_is_not_started() {
     let mut flash = flash_with(&image_a(), 1);
@@ -377,7 +379,7 @@ fn an_application_that_nobody_has_signed_is_not_started() {
     put(&mut flash, &forged);
     let start = |flash: &mut MockFlash, proof| boot(flash, &target(), Start { proof, ..Start::default() });
     let refused = Stay::NoProgram(Refusal::Signature);
-    // The image that was copied last is still in staging, and takes its place.
+    // The last copied image is still in staging and replaces the application.
     assert_eq!(start(&mut flash, Proof::None), Decision::Copy);
     clear(&mut flash);
     for proof in [Proof::None, Proof::Of(0), Proof::Of(image_a().header.crc())] {
@@ -407,7 +409,7 @@ fn clear(flash: &mut MockFlash) {
     run(&mut updater).unwrap();
 }
 
-/// Puts an image into the application area past the bootloader, as a debugger does.
+/// Puts an image into the application area without the bootloader, as a debugger does.
 fn put(flash: &mut MockFlash, image: &Image) {
     for sector in target().layout.application().sectors() {
         flash.start_erase(sector.start).unwrap();

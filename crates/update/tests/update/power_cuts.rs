@@ -1,4 +1,4 @@
-//! The power is cut at every flash operation of whole updates, and again in the recovery.
+//! Power cuts at every flash operation of whole updates, and again in the recovery.
 
 use crate::bench::{
     Image, SECTORS, chance, flash_of_words_with, flash_with, holds, image_a, image_b, install, is_thorough,
@@ -7,7 +7,7 @@ use crate::bench::{
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Refusal, Stay};
 
-/// What starts.
+/// The image that starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Runs {
     Old,
@@ -15,10 +15,10 @@ enum Runs {
     Nothing,
 }
 
-/// One of so many operations is cut where not all are.
+/// Only one of this many operations is cut, unless the run is thorough.
 const SAMPLE: u32 = 3;
 
-/// How many of `all` cuts there are at least.
+/// Least number of cuts among `all`.
 fn at_least(all: u32) -> u32 {
     if is_thorough() { all } else { all / SAMPLE }
 }
@@ -26,7 +26,7 @@ fn at_least(all: u32) -> u32 {
 /// A node before an update, and the update.
 struct Case {
     before: MockFlash,
-    /// The same node with the new image committed and not copied: cuts in the copy begin here, to save time.
+    /// The same node with the new image committed but not copied: cuts in the copy start here, to save time.
     committed: MockFlash,
     old: Option<Image>,
     new: Image,
@@ -39,7 +39,7 @@ impl Case {
         Case { before, committed, old, new }
     }
 
-    /// A node that runs A, which came by an update.
+    /// A node that runs A, installed by an update.
     fn from_a_to_b() -> Case {
         Case::new(flash_with(&image_a(), 1), Some(image_a()))
     }
@@ -54,14 +54,14 @@ impl Case {
         Case::new(MockFlash::new(&SECTORS, 1), None)
     }
 
-    /// Flash operations of the whole update.
+    /// Number of flash operations of the whole update.
     fn operations(&self) -> u32 {
         let mut flash = self.committed.clone();
         install(&mut flash).unwrap();
         flash.operations() - self.before.operations()
     }
 
-    /// The flash after the power was cut in this operation of the update.
+    /// The flash after a power cut in this operation of the update.
     fn cut(&self, operation: u32, weak: Weak) -> MockFlash {
         let commit = self.committed.operations() - self.before.operations();
         let mut flash = if operation < commit { self.before.clone() } else { self.committed.clone() };
@@ -73,7 +73,7 @@ impl Case {
         flash
     }
 
-    /// Starts the node; the answer must be one of the whole images, or nothing where there was nothing.
+    /// Starts the node; the result must be one of the complete images, or none if there was none before.
     fn start(&self, flash: &mut MockFlash) -> Runs {
         match (start(flash), &self.old) {
             (Decision::Start(header), Some(old)) if header == old.header && holds(flash, old) => Runs::Old,
@@ -83,7 +83,7 @@ impl Case {
         }
     }
 
-    /// Starts the node, and again: what one start decides holds.
+    /// Starts the node twice: the decision of one start is final.
     fn settle(&self, flash: &mut MockFlash) -> Runs {
         let runs = self.start(flash);
         flash.power_up();
@@ -91,8 +91,8 @@ impl Case {
         runs
     }
 
-    /// Cuts everywhere, in each of the ways; without `cargo xtask test --thorough` at every third operation, and at all around
-    /// the commit and the end.
+    /// Cuts everywhere, in each of the ways. Without `cargo xtask test --thorough` only at every third operation, and
+    /// at all operations around the commit and the end.
     fn cut_everywhere(&self, ways: &[Weak], mut check: impl FnMut(MockFlash)) {
         let (commit, end) = (self.committed.operations() - self.before.operations(), self.operations());
         let decides = |at: u32| at.abs_diff(commit) < 6 || end - at < 6;
@@ -104,7 +104,7 @@ impl Case {
     }
 }
 
-/// Every cut of a case, and a second download after every seventh that did not leave the new image.
+/// Every cut of a case, and a second download after every seventh cut that did not leave the new image.
 fn check_every_cut(case: &Case, ways: &[Weak]) -> [u32; 3] {
     let mut count = [0; 3];
     let mut again = 0;
@@ -167,7 +167,7 @@ fn second_cuts(case: &Case, all: u32) {
         assert!(flash.is_down());
         flash.power_up();
         let again = case.settle(&mut flash);
-        // A torn commit that was not revoked yet may read well after all.
+        // An incomplete commit that was not revoked yet may still read well.
         assert!(again == runs || recovery <= 4, "{runs:?} became {again:?}");
         cuts += 1;
     });

@@ -1,4 +1,4 @@
-//! The trial of a new image, and the way back to the one before it.
+//! The trial of a new image, and the return to the previous image.
 
 use crate::bench::{
     Image, assert_starts, chance, confirm, description, flash_of_words_with, flash_with, holds, image_a,
@@ -15,7 +15,7 @@ fn withdraw(flash: &mut MockFlash) {
     Trial::withdraw(flash, &target().layout).unwrap();
 }
 
-/// A, and B on trial after it.
+/// A node that ran A and now has B on trial.
 fn b_on_trial(seed: u64) -> MockFlash {
     let mut flash = flash_with(&image_a(), seed);
     update(&mut flash, &image_b().bytes()).unwrap();
@@ -98,7 +98,8 @@ fn of_two_images_that_nobody_has_confirmed_the_one_before_both_comes_back() {
     assert_starts(&mut flash, &image_a());
 }
 
-/// The counter of an image holds from its confirmation on; else its trial could only end well.
+/// The counter of an image applies from its confirmation on; otherwise a failed trial could not return to the previous
+/// image.
 #[test]
 fn the_counter_and_the_keys_of_an_image_on_trial_are_not_kept_yet() {
     let mut flash = flash_with(&image_a(), 1);
@@ -142,7 +143,7 @@ fn a_kept_image_that_nobody_has_signed_does_not_come_back() {
     assert_starts(&mut flash, &image_b());
 }
 
-/// A debugger has put another program there: the trial was not that program's.
+/// A debugger has written another program: the trial does not concern that program.
 #[test]
 fn a_program_that_a_debugger_puts_there_is_on_no_trial() {
     for is_over in [false, true] {
@@ -173,8 +174,8 @@ fn a_damaged_application_is_not_kept_and_the_new_one_is_on_no_trial() {
     assert_eq!(trial(&mut flash), Trial::None);
 }
 
-/// The power goes in each operation from the commit to the end of the swap, in each way, and in some operation of the recovery:
-/// what starts is whole, and where B is in place A can come back.
+/// Power cuts in each operation from the commit to the end of the swap, in each way, and in some operation of the
+/// recovery: the image that starts is complete, and if B is in place A can come back.
 #[test]
 fn after_a_cut_anywhere_in_the_swap_there_is_a_way_back() {
     for word in [4, 8] {
@@ -193,8 +194,8 @@ fn after_a_cut_anywhere_in_the_swap_there_is_a_way_back() {
     }
 }
 
-/// The power goes in each operation of the way back, in each way, and in some operation of the recovery: A starts, and B does not
-/// come again.
+/// Power cuts in each operation of the return, in each way, and in some operation of the recovery: A starts, and B does
+/// not come back.
 #[test]
 fn after_a_cut_anywhere_on_the_way_back_the_image_before_starts() {
     for word in [4, 8] {
@@ -212,7 +213,7 @@ fn after_a_cut_anywhere_on_the_way_back_the_image_before_starts() {
     }
 }
 
-/// A mark of the trial that was cut: B or A starts, and whichever starts is whole. Once A has come back it stays.
+/// A mark of the trial was cut: B or A starts, and the one that starts is complete. Once A has come back it stays.
 #[test]
 fn a_cut_in_a_mark_decides_for_one_of_the_two() {
     let acts: [fn(&mut MockFlash) -> bool; 3] = [
@@ -241,7 +242,7 @@ fn a_cut_in_a_mark_decides_for_one_of_the_two() {
     assert!(seen.iter().all(|count| *count > 5), "{seen:?}");
 }
 
-/// Cuts `act` in each operation, or in every third; then the recovery in an operation by chance.
+/// Cuts `act` in each operation, or in every third; then the recovery in a random operation.
 fn cut_everywhere(flash: &MockFlash, act: impl Fn(&mut MockFlash) -> bool, check: impl Fn(&mut MockFlash)) {
     let mut whole = flash.clone();
     assert!(act(&mut whole));
@@ -277,7 +278,7 @@ fn a_flash_that_cannot_keep_the_application_refuses_the_update_and_the_applicati
     while updater.phase() != update::Phase::Copying {
         updater.poll();
     }
-    // A cell that does not erase: it is 0 again before it is looked at.
+    // A cell that does not erase: it is set to 0 again before it is checked.
     for _ in 0..5 {
         updater.poll();
     }

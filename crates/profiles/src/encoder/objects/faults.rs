@@ -1,17 +1,18 @@
-//! Faults of the position sensors: CiA 406, 5.3, and a sensor that does not answer, or not with the right position.
+//! Faults of the position sensors: those of CiA 406, 5.3, no answer from a sensor, and a wrong position.
 
 use canopen::emcy::Condition;
 
 use crate::encoder::Conditions;
 use crate::fault::{Fault, Flags};
 
-/// An encoder does not answer, or not as one: the code of a broken pressure sensor, with 1 in the detail.
+/// An encoder does not answer, or sends no valid frame: the error code of a broken pressure sensor, with 1 in the
+/// detail.
 const ENCODER_BREAK: Fault = Fault {
     name: "EncoderBreak",
     condition: Condition { detail: [1, 0, 0, 0, 0], ..Condition::new(0x5006) },
     flags: Flags::sensor(8),
 };
-/// An encoder answers, and its position is not right: 2 in the detail.
+/// An encoder answers, but its position is wrong: 2 in the detail.
 const ENCODER_POSITION: Fault = Fault {
     name: "EncoderPosition",
     condition: Condition { detail: [2, 0, 0, 0, 0], ..Condition::new(0x5006) },
@@ -30,16 +31,16 @@ const INPUT_VOLTAGE: Fault = Fault {
     flags: Flags::sensor(10),
 };
 
-/// What outlives a loss of power is damaged, or a memory test has failed.
+/// The retained state is damaged, or a memory test has failed.
 const HARDWARE_MEMORY: Fault =
     Fault { name: "HardwareMemory", condition: Condition::new(0x5100), flags: Flags::system(8) };
 
-/// All of them.
+/// All faults of the encoder.
 pub const FAULTS: &[Fault] =
     &[ENCODER_BREAK, ENCODER_POSITION, INPUT_CURRENT, INPUT_VOLTAGE, HARDWARE_MEMORY];
 
 impl Conditions {
-    /// Calls `each` with every fault, and whether it is there.
+    /// Calls `each` with every fault and whether the fault is present.
     pub(crate) fn faults(self, each: &mut impl FnMut(&'static Fault, bool)) {
         each(&ENCODER_BREAK, self.sensor_break);
         each(&ENCODER_POSITION, self.position);

@@ -1,4 +1,5 @@
-//! Manufacturer-specific objects of the encoder, 2100h to 210Ch: which sensors there are, and what CiA 406 leaves open.
+//! Manufacturer-specific objects of the encoder, 2100h to 210Ch: description of the sensors, and functions that CiA 406
+//! leaves open.
 
 use crate::encoder::AUTOMATIC;
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
@@ -7,12 +8,12 @@ const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Objec
     Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
-/// A parameter that says what a sensor is.
+/// A parameter that describes a sensor.
 const fn sensor(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
     parameter(index, sub, name, kind).handled()
 }
 
-/// The codes 1 to 9 of object 1000h. The type decides whether the SSI input is read or the timer.
+/// The codes 1 to 9 of object 1000h. The type decides whether the SSI input or the timer is read.
 const fn sensor_type(sub: u8, name: &'static str, lowest: i64, default: i64) -> Object {
     sensor(0x2100, sub, name, Type::Unsigned8).limits(lowest, 9).value(default)
 }
@@ -46,11 +47,12 @@ pub(crate) const SENSORS: &[Object] = &[
     sensor_type(1, "Sensor type channel 1", 1, 5),
     // 0: there is no second sensor.
     sensor_type(2, "Sensor type channel 2", 0, 0),
-    // Incremental: steps per revolution, four a line. Linear: nm a step. The format has it for absolute rotary ones.
+    // Incremental: steps per revolution, four a line. Linear: nm a step. Absolute rotary: taken from the SSI frame
+    // instead.
     Object::highest(0x2101, 2, "Sensor resolution"),
     resolution(1, "Sensor resolution channel 1"),
     resolution(2, "Sensor resolution channel 2"),
-    // Of types 3 and 5; of type 9, periods of the code.
+    // Revolutions of types 3 and 5; periods of the code of type 9.
     Object::highest(0x2102, 2, "Electronically counted revolutions"),
     counted(1, "Counted revolutions channel 1"),
     counted(2, "Counted revolutions channel 2"),
@@ -62,7 +64,7 @@ pub(crate) const SENSORS: &[Object] = &[
     sensor(0x2103, 4, "Alarm bits", Type::Unsigned8).limits(0, 1),
     // 0 none, 1 even, 2 odd.
     sensor(0x2103, 5, "Parity", Type::Unsigned8).limits(0, 2),
-    // 0: no limit; FFFF FFFFh: from the resolution. Beyond it an SSI reading is not believed, and a count is in doubt.
+    // 0: no limit; FFFF FFFFh: from the resolution. Beyond it an SSI reading is rejected, and a count is in doubt.
     Object::highest(0x2104, 2, "Fastest movement"),
     fastest(1, "Fastest movement channel 1"),
     fastest(2, "Fastest movement channel 2"),
@@ -74,14 +76,14 @@ pub(crate) const SENSORS: &[Object] = &[
     parameter(0x2106, 4, "Lowest battery voltage", Type::Unsigned16).value(2400).unit("mV"),
     // 0: no limit.
     parameter(0x2106, 5, "Operating time limit", Type::Unsigned32).unit("0.1 h"),
-    // The source of 650Ah. Written after 2108h.
+    // The source of 650Ah. Locked by 2108h.
     Object::highest(0x2107, 3, "Factory data of the sensors"),
     module(1, "Factory offset", 0),
     module(2, "Factory lowest position", -0x8000_0000),
     module(3, "Factory highest position", 0x7FFF_FFFF),
-    // "fact" opens 2107h until the next reset or anything else is written.
+    // "fact" opens 2107h until the next reset or the next write of another value.
     Object::new(0x2108, 0, "Factory key", Type::Unsigned32, Access::WriteOnly),
-    // A mask of alarms (6503h) to clear.
+    // Mask of the alarms (6503h) to clear.
     Object::new(0x2109, 0, "Alarm acknowledgement", Type::Unsigned16, Access::WriteOnly).handled(),
     Object::highest(0x210A, 3, "Commands taken"),
     commands(1, "Presets channel 1"),

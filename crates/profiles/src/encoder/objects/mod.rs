@@ -1,11 +1,12 @@
-//! What the encoder means on the bus: its objects, and how measured values and parameters come in and out of them.
+//! Objects of the encoder, and the transfer of measured values and parameters between them and the measurement.
 //!
-//! The objects of the device profile (CiA 406, 6000h to 67FFh) and those of the manufacturer that it needs (21xxh).
+//! The objects of the device profile (CiA 406, 6000h to 67FFh) and the manufacturer-specific objects (21xxh) that it
+//! needs.
 
+mod device_profile;
 mod faults;
 mod manufacturer;
 mod pdos;
-mod profile;
 mod rules;
 mod sensors;
 mod values;
@@ -25,13 +26,14 @@ use crate::communication::{self, RPDOS, device_name, error_behaviour, tpdo_mappi
 use crate::fault::Fault;
 use crate::profile::Profile;
 
-/// The type of the encoder that the parameters describe by default.
+/// The encoder type that the default parameters describe.
 pub(crate) const DEFAULT_TYPE: u8 = 5;
 
-/// The device profile.
-pub(crate) static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
+/// Objects of the device profile.
+pub(crate) static PROFILE: [Object; dictionary::count(device_profile::PARTS)] =
+    dictionary::gather(device_profile::PARTS);
 
-/// The rows of the encoder as a device of its own, but for those that all devices have.
+/// The rows of a stand-alone encoder, without the rows that all devices have.
 pub const ROWS: &[&[Object]] = &[
     &[communication::device_type(device_type(DEFAULT_TYPE) as i64)],
     &[device_name("STM32F4 encoder")],
@@ -43,13 +45,13 @@ pub const ROWS: &[&[Object]] = &[
     &PROFILE,
 ];
 
-/// Where the values are in the image of that device.
+/// The places of the encoder's values in the image of that device.
 #[must_use]
 pub const fn fields(dictionary: &Dictionary) -> Fields {
     Fields::new(dictionary, 0x1000)
 }
 
-/// Whether a write to this object is decided on here.
+/// Whether one of the encoder's rules decides on a write to this object.
 #[must_use]
 pub const fn handles(index: u16, sub: u8) -> bool {
     rules::Rule::of(index, sub).is_some()

@@ -1,4 +1,5 @@
-//! TPDO 1 sends the position by event and timer, TPDO 2 with every SYNC (CiA 406, 6.4); the others wait for a use.
+//! TPDO 1 sends the position by event and timer, TPDO 2 with every SYNC (CiA 406, 6.4). The other TPDOs are not used by
+//! default.
 
 use super::values::POSITION;
 use crate::communication::Tpdo;
@@ -6,8 +7,8 @@ use canopen::dictionary::DefaultValue;
 
 const POSITION_VALUE: &[i64] = &[POSITION as i64];
 
-/// Type 254: sent on entering Operational and when the event timer elapses, which is 6200h. A change of the position is no
-/// event: CiA 406 names none but these two, and a shaft that turns changes it a thousand times a second.
+/// Type 254: sent on entering Operational and when the event timer (6200h) elapses. A change of the position is no
+/// event: CiA 406 names only these two, and a turning shaft changes the position a thousand times a second.
 pub(crate) const BY_EVENT: Tpdo = Tpdo {
     number: 0,
     cob_id: DefaultValue::NodeId(0x180),

@@ -1,4 +1,4 @@
-//! What a write to an object of the encoder means beyond storing a value.
+//! Checks and actions on writes to objects of the encoder.
 
 use super::values::Fields;
 use crate::encoder::{
@@ -7,18 +7,18 @@ use crate::encoder::{
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 
-/// The rules of the encoder's own objects.
+/// The rules for the encoder's objects.
 #[derive(Clone, Copy)]
 pub(super) enum Rule {
-    /// 6000h: bits that no sensor has are refused.
+    /// 6000h: reserved bits, and direction bits that apply to no sensor, are refused.
     Operating,
-    /// 6001h and 6002h: the whole of UNSIGNED32 (CiA 406, 7.2.2 and 7.2.3) but 0, which is no turn and no range.
+    /// 6001h and 6002h: all of UNSIGNED32 (CiA 406, 7.2.2 and 7.2.3) but 0, because a turn or range of 0 is impossible.
     Range,
     /// 6003h and 6010h: the position becomes the preset.
     Preset,
-    /// 6005h:1: not finer than every sensor.
+    /// 6005h:1: at least as coarse as the sensors resolve.
     Step,
-    /// 2100h to 2103h: what a sensor is.
+    /// 2100h to 2103h: description of a sensor.
     Sensor,
     /// 2107h: locked by 2108h.
     Factory,
@@ -42,11 +42,11 @@ impl Rule {
     }
 }
 
-/// What 2108h takes to open 2107h: "fact".
+/// The value of 2108h that opens 2107h: "fact".
 const FACTORY_SIGNATURE: [u8; 4] = *b"fact";
 
 impl Fields {
-    /// Decides on a write to an object with one of the rules above.
+    /// Checks a write to an object that has one of the rules above.
     pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let Some(rule) = Rule::of(entry.index(), entry.sub()) else { return Ok(()) };
         let mut word = [0; 4];
@@ -67,7 +67,7 @@ impl Fields {
         }
     }
 
-    /// Gives the command for a preset, and shows the position that it leads to: whoever reads it next reads the preset.
+    /// Gives the command for a preset. The position already shows the preset, so the next read returns it.
     fn preset(&self, entry: &Entry, value: u32, image: &mut [u8]) -> Result<(), Abort> {
         let ([first, second], parameters) = (&self.channels, self.parameters(image));
         let [first_own, second_own] = &parameters.channels;
@@ -83,7 +83,7 @@ impl Fields {
         Ok(())
     }
 
-    /// Tries what the sensor would be, and leaves it as it was when the scaling that is on could not be given.
+    /// Tries the new description, and restores the old one. Refuses it when the active scaling would become impossible.
     fn describe_sensor(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let field = entry.field();
         let before = Saved::of(field, image);
@@ -94,7 +94,8 @@ impl Fields {
     }
 }
 
-/// There is no preset without a reading, and none outside of the range. A reading that is not believed is believed with it.
+/// A preset needs a reading and must lie within the range. A reading that was rejected as implausible is accepted with
+/// the preset.
 fn check_preset(all: &Parameters, own: &ChannelParameters, state: u8, value: u32) -> Result<(), Abort> {
     match all.sensor(own) {
         Some(sensor) if state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0 => {
@@ -123,14 +124,14 @@ impl Saved {
     }
 }
 
-/// Bits that are reserved, the direction of what no sensor is, and a scaling that no sensor can give are refused.
+/// Refuses reserved bits, direction bits that apply to no sensor, and a scaling that a sensor cannot give.
 fn is_operating(parameters: &Parameters, value: u32) -> bool {
     let Ok(operating) = u16::try_from(value) else { return false };
     let known = COMMISSIONING | SCALING | parameters.directions();
     operating & !known == 0 && Parameters { operating, ..*parameters }.is_consistent()
 }
 
-/// Counts a command; 0 is only before the first.
+/// Counts a command. 0 appears only before the first command.
 fn count(field: Field, image: &mut [u8]) {
     field.store(image, [field.u8(image).checked_add(1).unwrap_or(1)]);
 }

@@ -1,11 +1,11 @@
-//! The description of the sensors, 2100h to 2106h: what every personality has that measures positions.
+//! Objects 2100h to 2106h: the description of the sensors, in every personality that measures positions.
 
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{ChannelParameters, Coding, Format, Limits, Parameters, Parity, SensorType};
 use canopen::dictionary::{Dictionary, Field};
 
-/// Where they are in the image.
+/// The places of these objects in the image.
 #[derive(Debug)]
 pub(crate) struct Sensors {
     channels: [Channel; 2],
@@ -61,7 +61,8 @@ impl Sensors {
         }
     }
 
-    /// What they say. The rest of the parameters has its defaults, and a frame that cannot be is the most common one.
+    /// The parameters in these objects. All other parameters have their defaults; an impossible frame is replaced by
+    /// [`Format::COMMON`].
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         let [lowest_supply, highest_supply, highest_current, lowest_battery] =
             self.limits.map(|at| at.u16(image));
@@ -75,7 +76,7 @@ impl Sensors {
         }
     }
 
-    /// Whether 2103h describes a frame that can be.
+    /// Whether 2103h describes a possible frame.
     pub(crate) fn has_format(&self, image: &[u8]) -> bool {
         self.format(image).is_some()
     }

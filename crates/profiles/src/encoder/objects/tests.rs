@@ -41,7 +41,7 @@ impl Node {
         self.sample();
     }
 
-    /// As the device does it: the rule, then the bytes; the parameters arrive before the next sample.
+    /// Writes as the device does: first the rule, then the bytes. The parameters arrive before the next sample.
     fn write(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
         self.write_late(index, sub, value)?;
         self.encoder.apply(&FIELDS.parameters(&self.image));
@@ -68,7 +68,7 @@ fn the_defaults_of_the_table_are_those_of_the_measurement() {
     assert_eq!(FIELDS.parameters(&defaults()), Parameters::default());
 }
 
-/// The objects of the encoder itself.
+/// The objects of the encoder.
 fn own() -> impl Iterator<Item = &'static Object> {
     SENSORS.iter().chain(&PROFILE)
 }
@@ -116,7 +116,7 @@ fn a_preset_is_read_at_once_and_stays() {
         let mut node = Node::new();
         node.turn_to(1000);
         assert_eq!(node.read(0x6004, 0), 1000);
-        // Not yet taken by the measurement: a sample from before must not show the old position.
+        // The measurement has not taken the preset yet: an earlier sample must not show the old position.
         node.write_late(index, sub, 77).unwrap();
         assert_eq!((node.read(0x6004, 0), node.read(0x6020, 1)), (77, 77));
         node.sample();
@@ -128,7 +128,7 @@ fn a_preset_is_read_at_once_and_stays() {
         assert_eq!((node.read(0x6003, 0), node.read(0x6010, 1), node.read(0x6010, 2)), (77, 77, 0));
         node.turn_to(1010);
         assert_eq!((node.read(0x6004, 0), node.read(0x6020, 1)), (87, 87));
-        // The same preset again is a preset again.
+        // A second write of the same preset acts as a preset again.
         node.write(index, sub, 77).unwrap();
         node.sample();
         assert_eq!(node.read(0x6004, 0), 77);
@@ -173,7 +173,7 @@ fn scaling_beyond_the_sensor_is_refused() {
     }
     node.write(0x2100, 1, 6).unwrap();
     node.write(0x6000, 0, 4).unwrap();
-    // While it works, no sensor comes that cannot give it: a rod has to resolve the measuring step.
+    // While scaling is on, a sensor that cannot give it is refused: a linear encoder has to resolve the measuring step.
     assert_eq!(node.write(0x2101, 1, 10_001), Err(Abort::InvalidValue));
     assert_eq!(node.read(0x2101, 1), 4096, "refused is not taken");
     node.write(0x6000, 0, 0).unwrap();
@@ -249,7 +249,7 @@ fn alarms_stay_until_they_are_acknowledged() {
     assert_eq!(node.read(0x6503, 0), 0);
 }
 
-/// The dictionary starts afresh, the measurement does not: no command is carried out again, and values are taken.
+/// The dictionary starts afresh and the measurement does not. No command is carried out again, and values are taken.
 #[test]
 fn a_reset_of_the_dictionary_repeats_no_command() {
     let mut node = Node::new();

@@ -1,4 +1,4 @@
-//! Measured values into the image, parameters out of it.
+//! Transfer of measured values into the image, and of parameters out of the image.
 
 use super::Sensors;
 use crate::encoder::{
@@ -6,14 +6,14 @@ use crate::encoder::{
 };
 use canopen::dictionary::{Dictionary, Field};
 
-/// 6004h and 6020h:1 as they are mapped.
+/// 6004h and 6020h:1 as PDO mapping entries.
 pub(super) const POSITION: u32 = 0x6004_0020;
 const FIRST_POSITION: u32 = 0x6020_0120;
 
 /// Type of an encoder with several sensors.
 const MULTI_SENSOR: u8 = 10;
 
-/// CiA 406.
+/// Number of the device profile, CiA 406.
 const PROFILE_NUMBER: u32 = 0x196;
 
 /// The device type: the type of the encoder and the number of the profile.
@@ -21,14 +21,14 @@ pub(crate) const fn device_type(encoder_type: u8) -> u32 {
     (encoder_type as u32) << 16 | PROFILE_NUMBER
 }
 
-/// Where the encoder's values are in the image of a dictionary that has its objects.
+/// The places of the encoder's values in the image of a dictionary with the encoder's objects.
 #[derive(Debug)]
 pub struct Fields {
     device_type: Field,
     mappings: [Field; 2],
     pub(super) sensors: Sensors,
     pub(super) channels: [Channel; 2],
-    /// The preset, the position and the offset of the first channel, where there is no sub-index.
+    /// Preset, position and offset of the first channel in the objects without sub-indexes.
     pub(super) preset: Field,
     pub(super) position: Field,
     offset: Field,
@@ -52,7 +52,7 @@ pub struct Fields {
     serial_number: [Field; 2],
 }
 
-/// Where the values of one channel are.
+/// The places of one channel's values.
 #[derive(Debug)]
 pub(super) struct Channel {
     pub(super) preset: Field,
@@ -70,7 +70,7 @@ pub(super) struct Channel {
     commissioning: Field,
 }
 
-/// Where the limits of one cam are.
+/// The places of one cam's limits.
 #[derive(Debug)]
 struct CamFields {
     low: Field,
@@ -122,7 +122,7 @@ impl Channel {
         self.speed.store(image, values.speed.to_le_bytes());
         self.sensor_state.store(image, [values.sensor_state]);
         self.commissioning.store(image, [values.commissioning.code()]);
-        // A sample from before the last preset must not bring the old position back.
+        // A sample from before the last preset must not restore the old position.
         if values.presets == self.presets.u8(image) {
             self.position.store(image, values.position.to_le_bytes());
             self.offset.store(image, values.offset.to_le_bytes());
@@ -148,7 +148,7 @@ impl Channel {
 }
 
 impl Fields {
-    /// Looks them up, during compilation; the index of the device type is 1000h or 67FFh.
+    /// Looks the fields up during compilation. `device_type` is the index of the device type: 1000h or 67FFh.
     pub(crate) const fn new(d: &Dictionary, device_type: u16) -> Fields {
         Fields {
             device_type: d.field(device_type, 0),
@@ -178,8 +178,8 @@ impl Fields {
         }
     }
 
-    /// Fills in what no table can know: the serial number (650Bh, hard-wired to 1018h:4), and what follows from the
-    /// sensors that there are.
+    /// Fills in the values that the table cannot have: the serial number (650Bh, hard-wired to 1018h:4), and the values
+    /// that depend on the sensors in use.
     pub(super) fn initialise(&self, image: &mut [u8]) {
         let [source, shown] = self.serial_number;
         shown.store(image, source.load::<4>(image));
@@ -190,7 +190,7 @@ impl Fields {
         }
     }
 
-    /// An encoder with several sensors has 6020h:1 where another one has 6004h (CiA 406, 1A00h): the same bits.
+    /// An encoder with several sensors maps 6020h:1 in place of 6004h (CiA 406, 1A00h). Both have the same bits.
     fn map_first_channel(&self, image: &mut [u8]) {
         for mapping in &self.mappings {
             if mapping.u32(image) == POSITION {
@@ -199,7 +199,7 @@ impl Fields {
         }
     }
 
-    /// Takes a snapshot into the image.
+    /// Copies a snapshot into the image.
     pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
         for (channel, values) in self.channels.iter().zip(&snapshot.channels) {
             channel.publish(values, image);
@@ -220,7 +220,7 @@ impl Fields {
         }
     }
 
-    /// The parameters in the image. A value that no write could have put there acts as the default one.
+    /// The parameters in the image. An impossible value acts as the default.
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         let [offset, low, high] = self.module.map(|at| i32::from_le_bytes(at.load(image)));
         let mask = self.acknowledgement.u16(image).into();

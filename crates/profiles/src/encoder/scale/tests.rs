@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 
 impl Scale {
-    /// The same scale the other way round.
+    /// The same scale with the other direction.
     pub(in crate::encoder) fn turned(self) -> Scale {
         Scale { reversed: !self.reversed, ..self }
     }
@@ -45,8 +45,8 @@ pub(in crate::encoder) fn any_scale() -> impl Strategy<Value = Scale> {
     any_settings().prop_map(|(native, settings)| Scale::new(&native, &settings).unwrap())
 }
 
-pub(in crate::encoder) fn shaft_at(total: i64, scale: &Scale) -> Shaft {
-    Shaft::at(total, scale.turn())
+pub(in crate::encoder) fn shaft_at(total: i64, scale: &Scale) -> ShaftPosition {
+    ShaftPosition::at(total, scale.turn())
 }
 
 /// Units per native step as a fraction, from the definitions.
@@ -71,7 +71,7 @@ proptest! {
         prop_assert_eq!(i128::from(scale.value(shaft_at(total, &scale), 0)), expected);
     }
 
-    /// One native step changes the value by what it is worth, rounded down or up, also where the range ends.
+    /// One native step changes the value by its scaled length, rounded down or up, also at the end of the range.
     #[test]
     fn has_no_jump_anywhere(scale in any_scale(), total in -(1_i64 << 60)..1 << 60, offset: i32) {
         let [here, there] = [total, total + 1].map(|total| scale.value(shaft_at(total, &scale), offset));
@@ -81,7 +81,7 @@ proptest! {
         prop_assert!(worth.contains(&u64::from(way)), "{} to {}", here, there);
     }
 
-    /// Within one range a shaft that turns forwards never reads less.
+    /// Within one range the value of a shaft that turns forwards never falls.
     #[test]
     fn is_monotonic(scale in any_scale(), from in any::<u32>(), by in 0..=u32::MAX) {
         let scale = if scale.is_reversed() { scale.turned() } else { scale };
@@ -118,8 +118,8 @@ fn refuses_what_the_sensor_cannot_resolve() {
 #[test]
 fn refuses_a_preset_outside_of_the_range() {
     let scale = Scale::new(&rotary(4096, 16), &scaled(360, 3600)).unwrap();
-    assert_eq!(scale.offset_for(3600, Shaft::default()), None);
-    assert_eq!(scale.offset_for(3599, Shaft::default()), Some(-1));
+    assert_eq!(scale.offset_for(3600, ShaftPosition::default()), None);
+    assert_eq!(scale.offset_for(3599, ShaftPosition::default()), Some(-1));
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn without_scaling_the_largest_sensor_fits_the_value() {
     assert_eq!(Scale::unscaled(&rotary(u32::MAX, 65_536), false).range(), MOST);
 }
 
-/// A rod of 1 um, read in steps of 5 um, and one of 5 nm in steps of 3 um.
+/// A linear encoder of 1 um with a measuring step of 5 um, and one of 5 nm with a measuring step of 3 um.
 #[test]
 fn a_rod_counts_in_its_measuring_step() {
     for (native, step, moved, expected) in [(1000, 5000, 26, 5), (5, 3000, 1199, 1), (5, 3000, 1200, 2)] {
@@ -139,7 +139,8 @@ fn a_rod_counts_in_its_measuring_step() {
 }
 
 proptest! {
-    /// However far it goes: floor(P * way of a step / unit), modulo all that the sensor tells apart.
+    /// For any length of travel: floor(P * length of a step / unit), modulo all positions that the sensor
+    /// distinguishes.
     #[test]
     fn a_way_is_never_rounded(
         exponent in 0..20_u32, revolutions in 1..=65_536_u32, travel in 1..=10_000_000_u32, step in 1..=u32::MAX,

@@ -45,7 +45,7 @@ fn identifiers_are_those_of_the_profile() {
     {
         assert_eq!(number(of).can_id(producer), id);
         let producer = matches!(number(of).cob_id, CobId::PlusNode(_)).then_some(producer);
-        // Bit 31: not valid, bit 30: no remote frames.
+        // Bit 31: not valid. Bit 30: no remote frames.
         for flags in [0, 0x4000_0000, 0x8000_0000, 0xC000_0000] {
             assert_eq!(by_cob_id(flags | u32::from(id)), Some(Definition { pdo: number(of), producer }));
         }

@@ -1,5 +1,5 @@
-//! Which virtual devices the node is, in the image: the choice (2305h), what follows from it (1000h, 6000h), and the PDOs that
-//! each of them sends with a CAN-ID that only one device of the lift may have.
+//! The virtual devices of the node in the image: the choice (2305h), the objects that depend on it (1000h, 6000h), and
+//! the TPDOs of the virtual devices whose CAN-ID only one device of the lift may use.
 
 use super::values::Fields;
 use crate::lift::devices::Devices;
@@ -7,7 +7,7 @@ use crate::lift::position::UNITS;
 use canopen::dictionary::{Dictionary, Field};
 use canopen::sdo::Multiplexer;
 
-/// Where these values are.
+/// The places of these values.
 #[derive(Debug)]
 pub(super) struct Choice {
     device_type: Field,
@@ -58,7 +58,7 @@ impl Choice {
         Devices(self.devices.u8(image))
     }
 
-    /// Device type and list of virtual devices.
+    /// Writes the device type and the list of virtual devices.
     fn show(&self, devices: Devices, image: &mut [u8]) {
         let (types, count) = devices.types();
         put(self.device_type, devices.device_type(), image);
@@ -69,15 +69,15 @@ impl Choice {
     }
 }
 
-/// Not inlined: this crate is compiled for speed, and a choice is in no hurry.
+/// Not inlined: this crate is compiled for speed, and a change of the choice is not urgent.
 #[inline(never)]
 fn put(at: Field, value: u32, image: &mut [u8]) {
     at.set(image, &value.to_le_bytes());
 }
 
 impl Fields {
-    /// The node is these virtual devices from now on: it sends nothing of the others. `begins` is true for a new choice (2305h), which
-    /// switches on what is chosen, and false after a reset.
+    /// Makes the node these virtual devices: TPDOs of all other virtual devices are switched off. `begins` is true for
+    /// a new choice (2305h), which also switches the chosen TPDOs on, and false after a reset.
     #[inline(never)]
     pub(super) fn choose(&self, devices: Devices, begins: bool, image: &mut [u8]) {
         self.choice.show(devices, image);
@@ -101,7 +101,7 @@ impl Fields {
         }
     }
 
-    /// Whether an object is one of a virtual device, or of a unit of it, that is there.
+    /// Whether an object belongs to a virtual device, and to a unit of it, that the node has.
     #[inline(never)]
     pub(super) fn is_there(&self, at: Multiplexer, image: &[u8]) -> bool {
         let devices = self.devices(image);

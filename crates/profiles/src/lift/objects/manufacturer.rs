@@ -1,5 +1,5 @@
-//! Manufacturer-specific objects of the lift, 2300h to 2322h: which virtual devices the node is, which sensors they have, and
-//! what CiA 417 leaves open. The sensors of positions are described as those of the encoder are (2100h to 2106h).
+//! Manufacturer-specific objects of the lift, 2300h to 2322h: choice of the virtual devices, their sensors, and
+//! functions that CiA 417 leaves open. Position sensors are described as in the encoder (2100h to 2106h).
 
 use crate::lift::devices::Devices;
 use crate::lift::position::UNKNOWN;
@@ -9,12 +9,12 @@ const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Objec
     Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
-/// The channel of the encoder that a position unit measures with; 0 for a unit that is not there.
+/// The encoder channel of a position unit; 0 for an unused unit.
 const fn source(sub: u8, name: &'static str, default: i64) -> Object {
     parameter(0x2301, sub, name, Type::Unsigned8).limits(0, 2).value(default).handled()
 }
 
-/// What a preset or a change of direction leads to.
+/// The offset that results from a preset or a change of direction.
 const fn offset(sub: u8, name: &'static str) -> Object {
     parameter(0x2302, sub, name, Type::Integer32).unit("6384h:1")
 }
@@ -25,7 +25,7 @@ const fn state(sub: u8, name: &'static str) -> Object {
         .mappable(Mapping::Tpdo)
 }
 
-/// Where the readings of the sensor are: a preset says that they are to be believed.
+/// The position by the readings of the sensor, including rejected ones: a preset accepts them.
 const fn reading(sub: u8, name: &'static str) -> Object {
     Object::new(0x2304, sub, name, Type::Unsigned32, Access::ReadOnly).unit("6384h:1")
 }
@@ -60,7 +60,7 @@ pub(super) const OBJECTS: &[Object] = &[
     reading(2, "Position unit 2 reading"),
     reading(3, "Position unit 3 reading"),
     reading(4, "Position unit 4 reading"),
-    // A bit for each: 0 car position units, 1 load measuring unit, 2 input panel unit, 3 output panel unit.
+    // One bit for each: 0 car position units, 1 load measuring unit, 2 input panel unit, 3 output panel unit.
     parameter(0x2305, 0, "Choice of virtual devices", Type::Unsigned8)
         .limits(0, Devices::ALL.0 as i64)
         .handled(),
@@ -68,34 +68,34 @@ pub(super) const OBJECTS: &[Object] = &[
     Object::new(0x2306, 1, "Sensor 1 references", Type::Unsigned8, Access::ReadOnly),
     Object::new(0x2306, 2, "Sensor 2 references", Type::Unsigned8, Access::ReadOnly),
     Object::highest(0x2310, 2, "Load filter"),
-    // As 61A0h and 61A1h of CiA 404.
+    // Codes as in 61A0h and 61A1h of CiA 404.
     parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),
     parameter(0x2310, 2, "Load filter constant", Type::Unsigned8).limits(1, 255).value(100),
-    // Two equal pressures: there is no load measuring unit.
+    // Two equal pressures switch the load measuring unit off.
     Object::highest(0x2311, 4, "Load calibration"),
     parameter(0x2311, 1, "Pressure at point 1", Type::Real32).unit("Pa"),
     parameter(0x2311, 2, "Load at point 1", Type::Real32).unit("kg"),
     parameter(0x2311, 3, "Pressure at point 2", Type::Real32).real(1.0e6).unit("Pa"),
     parameter(0x2311, 4, "Load at point 2", Type::Real32).real(1000.0).unit("kg"),
-    // What 6486h leads to.
+    // The offset that results from 6486h.
     parameter(0x2312, 0, "Load offset", Type::Real32).unit("kg"),
     Object::highest(0x2313, 2, "Load measurement"),
     Object::new(0x2313, 1, "Load as measured", Type::Real32, Access::ReadOnly).unit("kg"),
     // 1: the sensor or its wiring is broken.
     Object::new(0x2313, 2, "Load sensor state", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo),
-    // Two equal words: the button is not used, and without one there is no input panel unit.
+    // Two equal words: the button is not used. Without a used button the input panel unit does nothing.
     Object::highest(0x2320, 4, "Button words"),
     parameter(0x2320, 1, "Virtual input of button 1 released", Type::Unsigned48),
     parameter(0x2320, 2, "Virtual input of button 1 pressed", Type::Unsigned48),
     parameter(0x2320, 3, "Virtual input of button 2 released", Type::Unsigned48),
     parameter(0x2320, 4, "Virtual input of button 2 pressed", Type::Unsigned48),
-    // Two equal words: the lamp is not used, and without one there is no output panel unit.
+    // Two equal words: the lamp is not used. Without a used lamp the output panel unit does nothing.
     Object::highest(0x2321, 4, "Lamp words"),
     parameter(0x2321, 1, "Virtual output that puts lamp 1 out", Type::Unsigned48),
     parameter(0x2321, 2, "Virtual output that lights lamp 1", Type::Unsigned48),
     parameter(0x2321, 3, "Virtual output that puts lamp 2 out", Type::Unsigned48),
     parameter(0x2321, 4, "Virtual output that lights lamp 2", Type::Unsigned48),
-    // Not 0: lit; 10h to 17h flashing. A multiplexed PDO may write it, and an SDO client.
+    // 0: off; 10h to 17h: flashing; other values: lit. Written by a multiplexed PDO or by an SDO client.
     Object::highest(0x2322, 2, "Lamps"),
     lamp(1, "Lamp 1"),
     lamp(2, "Lamp 2"),

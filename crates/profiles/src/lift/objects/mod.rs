@@ -1,13 +1,13 @@
-//! What the lift devices mean on the bus: their objects, and how measured values and parameters come in and out of them.
+//! Objects of the lift devices, and the transfer of measured values and parameters between them and the measurement.
 //!
-//! The pre-defined PDOs (CiA 417-3-1), the objects of the application profile (6000h to 64FFh), and those of the
-//! manufacturer that they need (21xxh to 23xxh).
+//! The pre-defined PDOs (CiA 417-3-1), the objects of the application profile (6000h to 64FFh), and the
+//! manufacturer-specific objects that they need (21xxh to 23xxh).
 
+mod application_profile;
 mod choice;
 mod manufacturer;
 mod panel;
 pub mod pdos;
-mod profile;
 mod rules;
 mod sensors;
 mod values;
@@ -26,12 +26,14 @@ use crate::fault::Fault;
 use crate::pressure;
 use crate::profile::Profile;
 
-static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
+static PROFILE: [Object; dictionary::count(application_profile::PARTS)] =
+    dictionary::gather(application_profile::PARTS);
 
-/// Other devices of the lift do what its PDOs say: a fault is in them, so it must not end them.
+/// Error behaviour: no change of the NMT state. Other devices of the lift depend on the PDOs, which also report the
+/// fault, so a fault must not stop them.
 const NO_CHANGE: i64 = 1;
 
-/// The rows of the lift devices, but for those that all devices have.
+/// The rows of the lift devices, without the rows that all devices have.
 pub const ROWS: &[&[Object]] = &[
     &[device_type(NUMBER as i64)],
     &[device_name("STM32F4 lift unit")],
@@ -43,16 +45,16 @@ pub const ROWS: &[&[Object]] = &[
     &PROFILE,
 ];
 
-/// Where the values are in the image of that device.
+/// The places of the values in the image of that device.
 #[must_use]
 pub const fn fields(dictionary: &Dictionary) -> Fields {
     Fields::new(dictionary)
 }
 
-/// Every fault that a lift device finds is one of the sensors that it shares with the other profiles.
+/// None: every fault of a lift device is a fault of a sensor that other profiles have too.
 pub const FAULTS: &[Fault] = &[];
 
-/// Whether a write to this object is decided on here.
+/// Whether one of the lift's rules decides on a write to this object.
 #[must_use]
 pub const fn handles(index: u16, sub: u8) -> bool {
     rules::Rule::of(index, sub).is_some()
@@ -66,10 +68,10 @@ pub struct Objects {
     lamps: panel::LampStates,
 }
 
-/// TPDO of virtual inputs, RPDO of virtual outputs.
+/// TPDO of the virtual inputs; `OUTPUTS` is the RPDO of the virtual outputs.
 const INPUTS: u16 = 130;
 const OUTPUTS: u16 = 257;
-/// The RPDO that takes the multiplexed PDOs of all nodes that have none of their own.
+/// The RPDO that receives the multiplexed PDOs of all nodes that have no RPDO of their own.
 const MULTIPLEXED: u16 = 2;
 
 impl Profile for Objects {
@@ -102,13 +104,13 @@ impl Profile for Objects {
         self.fields.write(entry, bytes, image)
     }
 
-    /// A preset is kept, as that of CiA 406 is.
+    /// A preset is stored, as in CiA 406.
     fn stores(&self, index: u16, sub: u8) -> bool {
         index == 0x6382 && sub > 0
     }
 
-    /// The load measuring unit is on the pressure input, the position units are on those of the encoder. A virtual device that
-    /// is not chosen has no faults: there may be no sensor.
+    /// The load measuring unit uses the pressure input, the position units use the inputs of the encoder. A virtual
+    /// device that is not chosen reports no faults, because it may have no sensor.
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {
         let Snapshot { devices, load, position, .. } = snapshot;
         each(&pressure::objects::SENSOR_BREAK, devices.has(Devices::LOAD) && load.is_broken);

@@ -1,11 +1,11 @@
-//! The panel in the image: words of buttons and lamps, the virtual input and output.
+//! The panel in the image: words of buttons and lamps, virtual input, virtual output.
 
 use super::values::pair;
 use crate::lift::panel::{BUTTONS, Calls, Contact, LAMPS};
 use crate::lift::word::{Light, Word};
 use canopen::dictionary::{Dictionary, Field};
 
-/// Where the values of the panel are.
+/// The places of the panel's values.
 #[derive(Debug)]
 pub(super) struct PanelFields {
     input: Field,
@@ -14,18 +14,18 @@ pub(super) struct PanelFields {
     buttons: [[Field; 2]; BUTTONS],
     /// 6120h: bit 0, the input is used.
     enabled: [Field; BUTTONS],
-    /// The words that put a lamp out and that light it.
+    /// The words that switch a lamp off and on.
     lamp_words: [[Field; 2]; LAMPS],
-    /// 6200h: the words that lamps answer to.
+    /// 6200h: the words with the public structure to which lamps respond.
     answers: [Field; LAMPS],
     lamps: [Field; LAMPS],
 }
 
-/// The lamps beyond what the image says of them.
+/// State of the lamps beyond the image.
 #[derive(Debug, Default)]
 pub(super) struct LampStates {
     pub(super) milliseconds: u32,
-    /// The lifts that have lit a lamp: one of them does not put out what another one has lit.
+    /// The lifts that have lit a lamp: a lift does not switch off a lamp that another lift has lit.
     lit_by: [u8; LAMPS],
 }
 
@@ -42,7 +42,7 @@ impl PanelFields {
         }
     }
 
-    /// Puts the next call into the virtual input; whether there was one. A button that is not used has none.
+    /// Writes the next call to the virtual input and returns whether there was one. An unused button has no calls.
     #[inline(never)]
     pub(super) fn next_call(&self, calls: &mut Calls, image: &mut [u8]) -> bool {
         while let Some(Contact { button, is_pressed }) = calls.take_next() {
@@ -60,7 +60,7 @@ impl PanelFields {
         false
     }
 
-    /// 6100h: an input with the public structure has the same word for both of its states, but for the state.
+    /// 6100h: for an input with the public structure, the words of its two states differ in the state alone.
     #[inline(never)]
     pub(super) fn take_input(&self, button: usize, bytes: &[u8], image: &mut [u8]) {
         let (Some([released, pressed]), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else {
@@ -70,7 +70,7 @@ impl PanelFields {
         pressed.set(image, &Word(word).with_state(true).0);
     }
 
-    /// A command in the virtual output asks inputs for their states.
+    /// Handles a command in the virtual output that asks inputs for their states.
     #[inline(never)]
     pub(super) fn answer(&self, calls: &mut Calls, image: &[u8]) {
         let command = word(self.output, image);
@@ -81,8 +81,8 @@ impl PanelFields {
         }
     }
 
-    /// Does what a virtual output says to the lamps. To be called for every frame that brings one, the same one too: somebody
-    /// else may have changed the lamp since.
+    /// Applies a virtual output to the lamps. Must be called for every received frame, also for a repeated one, because
+    /// another client may have changed the lamp in the meantime.
     #[inline(never)]
     pub(super) fn follow_output(&self, states: &mut LampStates, image: &mut [u8]) {
         let output = word(self.output, image);
@@ -94,7 +94,7 @@ impl PanelFields {
         }
     }
 
-    /// Which lamps are lit.
+    /// Which lamps are lit now.
     #[inline(never)]
     pub(super) fn lit(&self, states: &LampStates, image: &[u8]) -> [bool; LAMPS] {
         self.lamps.map(|lamp| Light(lamp.u8(image)).is_lit(states.milliseconds))
@@ -102,7 +102,7 @@ impl PanelFields {
 }
 
 impl LampStates {
-    /// A client has set a lamp: whoever has lit it before has no part in it any more.
+    /// A client has set a lamp, so the lifts that had lit it no longer count.
     pub(super) fn forget(&mut self, lamp: usize) {
         if let Some(lit_by) = self.lit_by.get_mut(lamp) {
             *lit_by = 0;
@@ -110,7 +110,8 @@ impl LampStates {
     }
 }
 
-/// What an output says to the lamp with these words: one that puts it out, one that lights it, one that it answers to.
+/// Effect of an output on the lamp with these words: the word that switches it off, the word that switches it on, and
+/// its word with the public structure.
 #[inline(never)]
 fn says(words: [Field; 3], output: Word, lit_by: &mut u8, image: &[u8]) -> Option<Light> {
     let [off, on, own] = words.map(|at| word(at, image));
@@ -124,7 +125,7 @@ fn says(words: [Field; 3], output: Word, lit_by: &mut u8, image: &[u8]) -> Optio
     (output == on || output == off).then_some(light)
 }
 
-/// What becomes of a lamp when these lifts light it or put it out; `None` when others still light it.
+/// The new state of a lamp after these lifts light it or switch it off; `None` while other lifts still light it.
 fn follow(lit_by: &mut u8, lifts: u8, light: Light) -> Option<Light> {
     if light == Light::OFF {
         *lit_by &= !lifts;
@@ -134,7 +135,7 @@ fn follow(lit_by: &mut u8, lifts: u8, light: Light) -> Option<Light> {
     Some(light)
 }
 
-/// Not inlined: this crate is compiled for speed, and what happens at a call is in no hurry.
+/// Not inlined: this crate is compiled for speed, and calls are not urgent.
 #[inline(never)]
 fn word(at: Field, image: &[u8]) -> Word {
     Word(at.load(image))

@@ -1,22 +1,22 @@
-//! PDO objects of CiA 417 from the catalogue: their CAN-IDs and mappings are the profile's and do not change.
+//! PDO objects of CiA 417 from the catalogue. The profile fixes their CAN-IDs and mappings.
 //!
-//! A device has those of the virtual devices that it is. Nothing of the generic set of CiA 301 (1800h to 1803h with 180h +
-//! node-ID and up) is among them, so no PDO of a lift device can have the CAN-ID of another one of the same device.
+//! A device has the PDOs of its virtual devices. It has no PDO of the pre-defined connection set of CiA 301 (1800h to
+//! 1803h with 180h + node-ID and up), so no two PDOs of a lift device can have the same CAN-ID.
 
 use crate::communication::{self, inhibit_time, sync_start};
 use crate::lift::catalogue::{CobId, Content, Pdo, by_number};
 use canopen::dictionary::{self, Access, DefaultValue, Object, Type};
 
-/// Flags of a COB-ID: the PDO is switched off; no remote frames.
+/// Flag of a COB-ID: the PDO is off. `NO_REMOTE`: no remote frames.
 const OFF: u32 = 1 << 31;
 const NO_REMOTE: u32 = 1 << 30;
 
-/// A COB-ID of which only the flags change.
+/// A COB-ID whose flags alone can be changed.
 const fn cob_id(index: u16, default: DefaultValue) -> Object {
     communication::cob_id(index, default).predefined()
 }
 
-/// 255: the event is that of the profile.
+/// 255: the profile defines the event.
 const fn transmission_type(index: u16) -> Object {
     communication::transmission_type(index, 255)
 }
@@ -37,10 +37,11 @@ const fn pdo(number: u16) -> &'static Pdo {
     by_number(number).expect("no PDO of the catalogue has this number")
 }
 
-/// The communication parameter of a TPDO, 1800h + `number` - 1. One that is off sends nothing until it is switched on.
+/// The communication parameter of a TPDO, 1800h + `number` - 1. With `is_on` false the TPDO does not send until it is
+/// switched on.
 ///
 /// # Panics
-/// During compilation, when the catalogue does not have it.
+/// During compilation, if the catalogue does not have the number.
 #[must_use]
 pub const fn tpdo(number: u16, name: &'static str, is_on: bool) -> [Object; 6] {
     let pdo = pdo(number);
@@ -56,10 +57,10 @@ pub const fn tpdo(number: u16, name: &'static str, is_on: bool) -> [Object; 6] {
     ]
 }
 
-/// The same of TPDO 2, the multiplexed one: it has neither bit 30 in its COB-ID nor a SYNC start value.
+/// The communication parameter of TPDO 2, the multiplexed PDO: no bit 30 in its COB-ID, and no SYNC start value.
 ///
 /// # Panics
-/// Never: the catalogue has it.
+/// Never: the catalogue has number 2.
 #[must_use]
 pub const fn multiplexed_tpdo(name: &'static str) -> [Object; 5] {
     let pdo = pdo(2);
@@ -74,10 +75,11 @@ pub const fn multiplexed_tpdo(name: &'static str) -> [Object; 5] {
     ]
 }
 
-/// The communication parameter of the RPDO for what `producer` sends; PDOs with one CAN-ID for all have any producer.
+/// The communication parameter of the RPDO for the PDO of `producer`. For a PDO with the same CAN-ID in all devices,
+/// any producer will do.
 ///
 /// # Panics
-/// During compilation, when the catalogue does not have it.
+/// During compilation, if the catalogue does not have the number.
 #[must_use]
 pub const fn rpdo(number: u16, producer: u8, name: &'static str) -> [Object; 4] {
     let pdo = pdo(number);
@@ -86,27 +88,27 @@ pub const fn rpdo(number: u16, producer: u8, name: &'static str) -> [Object; 4] 
     [Object::highest(index, 5, name), cob_id(index, id), transmission_type(index), event_timer(index)]
 }
 
-/// The mapping parameter of a TPDO. `N` is one more than the objects that it carries.
+/// The mapping parameter of a TPDO. `N` is the number of mapped objects plus one.
 ///
 /// # Panics
-/// During compilation, when it is not, or when the catalogue does not have it.
+/// During compilation, if `N` is wrong or the catalogue does not have the number.
 #[must_use]
 pub const fn tpdo_mapping<const N: usize>(number: u16, name: &'static str) -> [Object; N] {
     let pdo = pdo(number);
     mapping(pdo, pdo.tpdo_index() + MAPPING, name, false)
 }
 
-/// The mapping parameter of an RPDO: as that of the TPDO, but for reserved bytes.
+/// The mapping parameter of an RPDO: that of the TPDO, with reserved bytes replaced by dummy objects.
 ///
 /// # Panics
-/// As [`tpdo_mapping`] and [`rpdo`] do.
+/// In the cases of [`tpdo_mapping`] and [`rpdo`].
 #[must_use]
 pub const fn rpdo_mapping<const N: usize>(number: u16, producer: u8, name: &'static str) -> [Object; N] {
     let pdo = pdo(number);
     mapping(pdo, pdo.rpdo_index(producer).expect("the producer is no node") + MAPPING, name, true)
 }
 
-/// From a communication parameter to its mapping parameter.
+/// Distance from a communication parameter to its mapping parameter.
 const MAPPING: u16 = 0x200;
 /// The number of mapped objects that makes a PDO a multiplexed one in destination address mode (CiA 301, 7.2.2.6).
 const DESTINATION: i64 = 0xFF;
@@ -145,9 +147,9 @@ macro_rules! mapped {
     };
 }
 
-/// Those of this node. As consumer: virtual outputs, and the multiplexed PDOs of the nodes 1 to 7; as producer: its own
-/// multiplexed PDO, virtual inputs, the load, the positions. What has the same CAN-ID in every device is off until the node is
-/// chosen to be such a virtual device: two nodes as delivered must not send with one CAN-ID.
+/// PDOs of this node. It consumes virtual outputs and the multiplexed PDOs of the nodes 1 to 7. It produces its own
+/// multiplexed PDO, virtual inputs, the load and the positions. TPDOs whose CAN-ID is the same in every device are off
+/// until the virtual device is chosen, because two nodes as delivered must not send with the same CAN-ID.
 const PARTS: &[&[Object]] = &[
     &rpdo(2, 1, communication!("RPDO", 2)),
     &rpdo(2, 2, communication!("RPDO", 3)),

@@ -1,4 +1,4 @@
-//! What a write to an object of the lift means beyond storing a value.
+//! Checks and actions on writes to objects of the lift.
 
 use super::values::{Fields, UnitFields};
 use crate::lift::devices::Devices;
@@ -7,24 +7,24 @@ use crate::pressure::objects::calibration;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 
-/// The rules of the lift's own objects.
+/// The rules for the lift's objects.
 #[derive(Clone, Copy)]
 pub(super) enum Rule {
     /// 6380h: the direction of a unit.
     Operating,
     /// 6382h: the position becomes the preset.
     Preset,
-    /// 6384h:1, 2300h, 2100h to 2103h: in what a position is measured.
+    /// 6384h:1, 2300h, 2100h to 2103h: measuring step, travel and sensors, which define the units of positions.
     Measure,
-    /// 6486h: the load in the car is this.
+    /// 6486h: the load that is in the car now.
     Reference,
     /// 2301h: the sensor of a unit.
     Source,
-    /// 2305h: the virtual devices that the node is.
+    /// 2305h: the virtual devices of the node.
     Devices,
-    /// 6100h: what a button tells.
+    /// 6100h: the word of a button.
     Input,
-    /// 2200h to 2203h.
+    /// 2200h to 2203h: the calibration of the transducer.
     Calibration(calibration::Rule),
 }
 
@@ -48,7 +48,7 @@ impl Rule {
 }
 
 impl Fields {
-    /// Decides on a write to an object with one of the rules above.
+    /// Checks a write to an object that has one of the rules above.
     pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let Some(rule) = Rule::of(entry.index(), entry.sub()) else { return Ok(()) };
         let unit = usize::from(entry.sub()).wrapping_sub(1);
@@ -71,7 +71,7 @@ impl Fields {
         }
     }
 
-    /// A unit that is turned round stays where it is: the offset follows.
+    /// Changes the direction of a unit. The position stays the same, so the offset changes.
     fn operate(&self, number: usize, value: u32, image: &mut [u8]) -> Result<(), Abort> {
         let operating = u16::try_from(value).ok().filter(|bits| bits & !INVERTED == 0);
         let operating = operating.ok_or(Abort::InvalidValue)?;
@@ -84,7 +84,7 @@ impl Fields {
         Ok(())
     }
 
-    /// Finds the offset, and shows the position that it leads to: whoever reads it next reads the preset.
+    /// Computes the offset for a preset. The position already shows the preset, so the next read returns it.
     fn preset(&self, number: usize, preset: u32, image: &mut [u8]) -> Result<(), Abort> {
         let unit = self.unit(number)?;
         let source = Source::from_code(unit.source.u8(image)).ok_or(Abort::DeviceState)?;
@@ -95,14 +95,14 @@ impl Fields {
         let offset = self.position_parameters(image).preset(number, position, preset);
         unit.offset.store(image, offset.ok_or(Abort::InvalidValue)?.to_le_bytes());
         unit.position.store(image, preset.to_le_bytes());
-        // 0 is only before the first.
+        // 0 appears only before the first preset.
         let references = source.of(&self.references);
         references.store(image, [references.u8(image).checked_add(1).unwrap_or(1)]);
         Ok(())
     }
 
-    /// Tries another measuring step, way or sensor; what no sensor can give is refused. In other units the offsets have
-    /// lost their meaning and are 0 again, as that of CiA 406 is.
+    /// Tries another measuring step, travel or sensor; one that a sensor cannot give is refused. In other units the
+    /// offsets have lost their meaning and become 0, as in CiA 406.
     fn measure_anew(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let before = Value::of(field, image);
         field.set(image, bytes);
@@ -125,7 +125,7 @@ impl Fields {
         Ok(())
     }
 
-    /// Says what is in the car now. A load that is not measured is no reference.
+    /// Takes the load that is in the car now as reference. Refused while the load is not measured.
     fn weigh(&self, kilograms: u32, image: &mut [u8]) -> Result<(), Abort> {
         let is_measured = self.load_parameters(image).is_calibrated() && self.load_state.u8(image) == 0;
         let reference = u16::try_from(kilograms).map_err(|_| Abort::InvalidValue)?;

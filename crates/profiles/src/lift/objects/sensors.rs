@@ -1,9 +1,9 @@
-//! The position sensors of the lift are described as those of the encoder are: 2100h to 2106h.
+//! The position sensors of the lift: objects 2100h to 2106h, as in the encoder.
 
 use crate::encoder;
 use canopen::dictionary::Object;
 
-/// The encoder's rows that describe sensors; those after them belong to CiA 406.
+/// The encoder's rows that describe sensors. The rows after them belong to CiA 406.
 pub(super) const OBJECTS: &[Object] = before(encoder::objects::SENSORS, 0x2107);
 
 const fn before(rows: &'static [Object], index: u16) -> &'static [Object] {

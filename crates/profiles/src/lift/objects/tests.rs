@@ -29,7 +29,7 @@ struct Node {
     inputs: Inputs,
 }
 
-/// Readings at this share of the pressure range, 0 to 10 bar, in per mille.
+/// Readings at this share of the pressure range (0 to 10 bar), in per mille.
 fn pressure(permille: u32) -> RawSample {
     let supply = 16 * 4000;
     RawSample {
@@ -64,12 +64,12 @@ impl Node {
         self.objects.publish(&snapshot, &mut self.image);
     }
 
-    /// What the virtual input says next.
+    /// The next call in the virtual input.
     fn call(&mut self) -> Option<u64> {
         self.objects.next_event(INPUTS, &mut self.image).then(|| self.read(0x6010, 0))
     }
 
-    /// A virtual output comes, over the bus.
+    /// Receives a virtual output from the bus.
     fn output(&mut self, word: i64) -> [bool; 2] {
         self.write(0x6011, 0, word).unwrap();
         self.objects.received(OUTPUTS, &mut self.image);
@@ -80,13 +80,13 @@ impl Node {
         self.objects.outputs(&self.image).digital
     }
 
-    /// Goes to this way in sensor steps of 200 mm / 4096.
+    /// Moves the sensor to this count, in steps of 200 mm / 4096.
     fn go_to(&mut self, counter: u16) {
         self.inputs.position.counter = counter;
         self.sample();
     }
 
-    /// As the device does it: the rule, then the bytes; the parameters arrive before the next sample.
+    /// Writes as the device does: first the rule, then the bytes. The parameters arrive before the next sample.
     fn write(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
         self.write_late(index, sub, value)?;
         self.lift.apply(&FIELDS.parameters(&self.image));
@@ -135,8 +135,8 @@ fn every_parameter_is_saved_and_nothing_else() {
     assert_eq!(others, [0x2322, 0x2322, 0x6011], "outputs");
 }
 
-/// But for the trial of a program, the words of the panel and the lift number, which do not concern the measurement, and what a preset and a
-/// reference weight leave behind.
+/// Except for the trial of a program, the words of the panel and the lift number, which do not concern the measurement,
+/// and the values that a preset and a reference weight leave behind.
 #[test]
 fn every_parameter_changes_what_the_measurement_gets() {
     let silent = [0x2002, 0x2320, 0x2321, 0x6001, 0x6100, 0x6120, 0x6200, 0x6382, 0x6486];
@@ -169,7 +169,7 @@ fn a_preset_is_read_at_once_and_stays() {
     let mut node = Node::new();
     node.go_to(20_480);
     assert_eq!(node.read(0x6383, 1), 1000);
-    // Not yet taken by the measurement: a sample from before must not show the old position.
+    // The measurement has not taken the preset yet: an earlier sample must not show the old position.
     node.write_late(0x6382, 1, 77_000).unwrap();
     assert_eq!(node.read(0x6383, 1), 77_000);
     node.sample();
@@ -177,7 +177,7 @@ fn a_preset_is_read_at_once_and_stays() {
     node.lift.apply(&FIELDS.parameters(&node.image));
     node.go_to(20_480 + 2048);
     assert_eq!((node.read(0x6383, 1), node.read(0x2302, 1)), (77_100, 76_000));
-    // It is a parameter: after a reset that finds it stored it is the same.
+    // The offset is a parameter: a reset that loads it from the store gives the same position.
     let stored = node.image;
     node.image = defaults();
     DICTIONARY.field(0x2302, 1).set(&mut node.image, DICTIONARY.field(0x2302, 1).get(&stored));
@@ -225,7 +225,7 @@ fn another_measuring_step_clears_the_offset_and_must_be_one_of_the_sensor() {
     }
     let mut node = Node::new();
     node.write(0x6382, 1, 5000).unwrap();
-    // A sensor step is 48.8 um: 10 um is finer.
+    // A sensor step is 48.8 um, so a measuring step of 10 um is too fine.
     for (index, sub, value) in [(0x6384, 1, 4), (0x2101, 1, 199), (0x2103, 2, 31)] {
         assert_eq!(node.write(index, sub, value), Err(Abort::InvalidValue), "{index:X}h");
     }
@@ -315,7 +315,7 @@ fn a_button_is_a_word_and_a_word_is_a_lamp() {
     let mut node = panel();
     node.objects.begin_events(INPUTS, &mut node.image);
     assert_eq!([node.call(), node.call(), node.call()], [Some(0x11), Some(0x12), None], "as they are");
-    // Each change is told, in its order, however late, and what was told last stays.
+    // Each change is sent, in order, however late, and the last one stays in the object.
     for buttons in [[true, true], [true, true], [false, true], [false, false], [false, false]] {
         node.inputs.digital = buttons;
         node.sample();
@@ -339,7 +339,7 @@ fn a_button_is_a_word_and_a_word_is_a_lamp() {
     assert_eq!(node.lit(), [false, true], "another PDO brings no output");
 }
 
-/// Somebody else has put the lamp out: what the call controller says again holds again.
+/// Another client has switched the lamp off: a repeated output of the call controller lights it again.
 #[test]
 fn a_repeated_output_is_followed_too() {
     let mut node = panel();
@@ -366,7 +366,7 @@ fn a_button_that_is_not_used_says_nothing() {
     assert_eq!(node.call(), None, "switched off by its parameter");
 }
 
-/// As delivered, and with other virtual devices only.
+/// As delivered, and with virtual devices other than panels.
 #[test]
 fn a_node_that_is_no_panel_has_no_calls_and_no_lamps() {
     for devices in [0, 3] {
@@ -435,13 +435,13 @@ fn a_lamp_answers_to_its_lifts_and_flashes() {
         lit += u32::from(node.lit()[0]);
     }
     assert_eq!(lit, 2500);
-    // One pulse: there is no timer for it.
+    // One pulse has no timer here, so the lamp is lit.
     assert_eq!(node.output(on(1, 0x15)), [true, false]);
     assert_eq!(node.output(on(1, 0x14)), [false, false]);
     assert_eq!(node.read(0x2322, 1), Light::OFF.0.into());
 }
 
-/// The choice decides on the device type, the list and the PDOs; a unit without a sensor has none.
+/// The choice determines the device type, the list and the PDOs. A unit without a sensor has no PDO.
 #[test]
 fn the_choice_of_virtual_devices() {
     let mut node = Node::new();
@@ -466,7 +466,7 @@ fn the_choice_of_virtual_devices() {
     assert_eq!(on(&node), [false, false, false, true, false], "units with a sensor");
 }
 
-/// What is stored of the PDOs may be older than the choice.
+/// The stored PDO parameters may be older than the stored choice.
 #[test]
 fn a_reset_silences_what_is_not_chosen() {
     let mut node = Node::new();
@@ -489,7 +489,7 @@ fn a_virtual_device_that_is_not_chosen_has_no_faults() {
     assert_eq!([Devices(0), Devices::POSITION, Devices::LOAD].map(active), [0, 0, 1]);
 }
 
-/// What the catalogue says of a PDO is what the device reads in the objects.
+/// The objects of the device agree with the catalogue.
 #[test]
 fn the_pdos_are_those_of_the_catalogue() {
     let row = |index, sub| rows().find(|row| (row.index, row.sub) == (index, sub));
@@ -517,7 +517,7 @@ fn the_pdos_are_those_of_the_catalogue() {
     }
 }
 
-/// An identifier twice would be two PDOs in one frame.
+/// A shared identifier would put two PDOs into one frame.
 #[test]
 fn no_two_pdos_share_an_identifier() {
     let mut ids: Vec<i64> = rows().filter(|row| row.rule == Rule::PdoPredefined).map(cob_id).collect();
@@ -527,7 +527,7 @@ fn no_two_pdos_share_an_identifier() {
     assert_eq!(ids.len(), 15);
 }
 
-/// With a node-ID that is none of the producers' whose multiplexed PDOs are received.
+/// With a node-ID whose multiplexed PDO is not among those received.
 fn cob_id(row: &Object) -> i64 {
     match row.default {
         dictionary::DefaultValue::Integer(value) => value & 0x7FF,

@@ -1,4 +1,4 @@
-//! Measured values into the image, parameters out of it.
+//! Transfer of measured values into the image, and of parameters out of the image.
 
 use super::choice::Choice;
 use super::panel::PanelFields;
@@ -12,7 +12,7 @@ use crate::pressure::objects::Places;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::{NonZeroU16, NonZeroU32};
 
-/// Where the lift's values are in the image of its dictionary.
+/// The places of the lift's values in the image of its dictionary.
 #[derive(Debug)]
 pub struct Fields {
     pub(super) choice: Choice,
@@ -20,7 +20,7 @@ pub struct Fields {
     pub(super) sensors: Sensors,
     pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
-    /// How often a preset has said where the sensor of a channel is.
+    /// For each channel: how many presets have confirmed the position of its sensor.
     pub(super) references: [Field; 2],
     travel: Field,
     position_step: Field,
@@ -36,7 +36,7 @@ pub struct Fields {
     pub(super) load_state: Field,
 }
 
-/// Where the values of one position unit are.
+/// The places of one position unit's values.
 #[derive(Debug)]
 pub(super) struct UnitFields {
     pub(super) source: Field,
@@ -87,7 +87,7 @@ impl UnitFields {
         self.resolution.store(image, values.resolution.to_le_bytes());
         self.revolutions.store(image, values.revolutions.to_le_bytes());
         self.warnings.store(image, values.warnings.to_le_bytes());
-        // A sample from before the last preset must not bring the old position back.
+        // A sample from before the last preset must not restore the old position.
         if values.offset == integer(self.offset, image) {
             self.position.store(image, values.position.to_le_bytes());
             self.reading.store(image, values.reading.to_le_bytes());
@@ -97,7 +97,7 @@ impl UnitFields {
 }
 
 impl Fields {
-    /// Looks them up, during compilation.
+    /// Looks the fields up during compilation.
     pub(crate) const fn new(d: &Dictionary) -> Fields {
         Fields {
             choice: Choice::new(d),
@@ -126,7 +126,7 @@ impl Fields {
         }
     }
 
-    /// Takes a snapshot into the image.
+    /// Copies a snapshot into the image.
     pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
         for (unit, values) in self.units.iter().zip(&snapshot.position.units) {
             unit.publish(values, image);
@@ -136,7 +136,7 @@ impl Fields {
 
     fn publish_load(&self, values: &load::Snapshot, image: &mut [u8]) {
         self.load_state.store(image, [values.is_broken.into()]);
-        // A sample from before the last reference must not bring the old load back.
+        // A sample from before the last reference must not restore the old load.
         if values.offset.to_le_bytes() == self.load_offset.load(image) {
             self.load.store(image, values.load.to_le_bytes());
             self.signals.store(image, [values.signals]);
@@ -144,7 +144,7 @@ impl Fields {
         }
     }
 
-    /// The parameters in the image. A value that no write could have put there acts as the smallest.
+    /// The parameters in the image. An impossible value acts as the smallest possible one.
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         Parameters {
             position: self.position_parameters(image),
@@ -180,8 +180,8 @@ impl Fields {
         }
     }
 
-    /// Fills in what follows from the parameters: which virtual devices the node is. One that it is not sends nothing, whatever
-    /// else is stored.
+    /// Fills in the objects that depend on the choice of virtual devices. The TPDOs of virtual devices that are not
+    /// chosen are switched off, whatever is stored.
     pub(crate) fn initialise(&self, image: &mut [u8]) {
         self.choose(self.devices(image), false, image);
     }
@@ -192,7 +192,7 @@ impl Fields {
     }
 }
 
-/// Two sub-indexes in a row.
+/// Two consecutive sub-indexes.
 pub(super) const fn pair(d: &Dictionary, index: u16, first: u8) -> [Field; 2] {
     [d.field(index, first), d.field(index, first + 1)]
 }

@@ -1,8 +1,8 @@
-//! Calibration, 2200h to 2204h: manufacturer objects that are written in production and locked after it.
+//! Calibration, 2200h to 2204h: manufacturer-specific objects that are written and then locked in production.
 //!
-//! The formulas are those of [`PressureCalibration`] and [`Thermistor`]. A write needs the key in 2203h, else it is
-//! refused with 0800 0022h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
-//! written acts from the next sample on, and is kept when 2204h gets "save". 1010h and 1011h do not touch it.
+//! For the formulas see [`PressureCalibration`] and [`Thermistor`]. A write needs the key in 2203h, else it is refused
+//! with 0800 0022h. A value that would make the calibration invalid is refused with 0604 0043h. Written values act from
+//! the next sample on, and are stored when 2204h gets "save". 1010h and 1011h do not affect them.
 
 use crate::pressure::{
     Calibration, Polynomial, PressureCalibration, TemperatureCalibration, Thermistor, Thermometer,
@@ -10,14 +10,14 @@ use crate::pressure::{
 use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Object, Type};
 use canopen::sdo::Abort;
 
-/// The rules of these objects.
+/// The rules for these objects.
 #[derive(Clone, Copy)]
 pub(crate) enum Rule {
     /// 2200h and 2201h: a value of the calibration.
     Value,
     /// 2202h: a record about the calibration.
     Record,
-    /// 2203h: the lock of the others.
+    /// 2203h: the lock of the other objects.
     Lock,
 }
 
@@ -33,7 +33,7 @@ impl Rule {
     }
 }
 
-/// What 2203h takes to open the lock until the node is reset: "cali". 0 closes it.
+/// The value of 2203h that opens the lock until the node is reset: "cali". 0 closes the lock.
 const KEY: [u8; 4] = *b"cali";
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -75,13 +75,13 @@ pub(crate) const CALIBRATION: &[Object] = &[
     real(0x2201, 9, "Highest ratio of an intact thermistor", 0.99),
     Object::highest(0x2202, 2, "Calibration record"),
     parameter(0x2202, 1, "Number of calibrations", Type::Unsigned32),
-    // As decimal digits, year, month and day: 20251231. 0 for a device that was not calibrated.
+    // Decimal digits of year, month and day: 20251231. 0 for a device that was not calibrated.
     parameter(0x2202, 2, "Date of calibration", Type::Unsigned32).limits(0, 99_991_231),
     command(0x2203, "Calibration lock").handled(),
     command(0x2204, "Save calibration").stores_calibration().value(1),
 ];
 
-/// Where the values are.
+/// The places of the values.
 #[derive(Debug)]
 pub(crate) struct Places {
     pressure: [Field; 11],
@@ -100,7 +100,7 @@ impl Places {
         }
     }
 
-    /// The calibration in the image. One that no write could have put there acts as the default one.
+    /// The calibration in the image. An impossible calibration acts as the default one.
     pub(crate) fn calibration(&self, image: &[u8]) -> Calibration {
         Some(self.load(image)).filter(Calibration::is_valid).unwrap_or_default()
     }
@@ -126,9 +126,9 @@ impl Places {
         }
     }
 
-    /// Tries the value, and leaves the image as it was: the device stores what is admitted.
+    /// Tries the value, and restores the image: the device stores an admitted value.
     fn admits(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> bool {
-        // A shorter value has others behind it, which are put back as they were.
+        // A value shorter than four bytes is followed by other values, which are restored too.
         let before: [u8; 4] = field.load(image);
         field.set(image, bytes);
         let is_valid = self.load(image).is_valid();
@@ -136,7 +136,7 @@ impl Places {
         is_valid
     }
 
-    /// Decides on a write to an object with one of the rules above.
+    /// Checks a write to an object that has one of the rules above.
     pub(crate) fn write(
         &self,
         rule: Rule,
@@ -154,7 +154,7 @@ impl Places {
     }
 }
 
-/// The places of `N` values from a sub-index on.
+/// The places of `N` values, starting at a sub-index.
 const fn fields<const N: usize>(d: &Dictionary, index: u16, first: u8) -> [Field; N] {
     let mut fields = [d.field(index, first); N];
     let mut i: u8 = 0;

@@ -1,4 +1,4 @@
-//! Faults of the pressure and temperature inputs, and the flags that show the faults of the device: 3000h, 1002h.
+//! Faults of the pressure and temperature inputs, and the flags that show all faults of the device: 3000h, 1002h.
 
 use canopen::dictionary::{Dictionary, Field};
 use canopen::emcy::Condition;
@@ -6,7 +6,7 @@ use canopen::emcy::Condition;
 use crate::fault::{Fault, Flags};
 use crate::pressure::Conditions;
 
-/// The signal is outside what an intact sensor can give.
+/// The signal is outside the range of an intact sensor.
 pub(crate) const SENSOR_BREAK: Fault =
     Fault { name: "SensorBreak", condition: Condition::new(0x5006), flags: Flags::sensor(5) };
 /// The pressure input is at a rail of the converter.
@@ -16,11 +16,11 @@ const PRESSURE_RAIL: Fault =
 const TEMPERATURE_RAIL: Fault =
     Fault { name: "TemperatureRail", condition: Condition::new(0x8001), flags: Flags::sensor(3) };
 
-/// All of them.
+/// All faults of these inputs.
 pub const FAULTS: &[Fault] = &[SENSOR_BREAK, PRESSURE_RAIL, TEMPERATURE_RAIL];
 
 impl Conditions {
-    /// Calls `each` with every fault, and whether it is there.
+    /// Calls `each` with every fault and whether the fault is present.
     pub(super) fn faults(self, each: &mut impl FnMut(&'static Fault, bool)) {
         each(&SENSOR_BREAK, self.sensor_break);
         each(&PRESSURE_RAIL, self.pressure_rail);
@@ -28,7 +28,7 @@ impl Conditions {
     }
 }
 
-/// Where the flags are.
+/// The places of the flags.
 #[derive(Debug)]
 pub(super) struct FlagFields {
     sensor: Field,
@@ -49,8 +49,8 @@ impl FlagFields {
         }
     }
 
-    /// Writes the flags and their summary: bit 0 any error of a sensor, bit 1 any error of the internal protocol (there is none),
-    /// bit 2 any error at all, those of the communication too, which have no flags.
+    /// Writes the flags and their summary. Bit 0: any sensor error. Bit 1: any error of the internal protocol, never
+    /// set. Bit 2: any error at all, including communication errors, which have no flags.
     pub(super) fn show(&self, flags: Flags, image: &mut [u8]) {
         let is_error = flags != Flags::NONE || self.register.u8(image) != 0;
         let summary = u32::from(flags.sensor != 0) | u32::from(is_error) << 2;

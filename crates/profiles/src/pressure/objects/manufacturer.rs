@@ -10,7 +10,7 @@ const fn user(sub: u8) -> Object {
     Object::new(0x4000, sub, "User word", Type::Unsigned32, Access::ReadWrite).stored(Group::Application)
 }
 
-/// 1002h.
+/// 1002h, manufacturer status register.
 pub(crate) const STATUS_REGISTER: &[Object] =
     &[Object::new(0x1002, 0, "Manufacturer status register", Type::Unsigned32, Access::ReadOnly)
         .mappable(Mapping::Tpdo)];

@@ -1,18 +1,18 @@
-//! What the transmitter means on the bus: its objects, and how measured values and parameters come in and out of them.
+//! Objects of the transmitter, and the transfer of measured values and parameters between them and the measurement.
 
 pub(crate) mod calibration;
+mod device_profile;
 mod faults;
 mod manufacturer;
 mod pdos;
-mod profile;
 mod rules;
 mod values;
 
 pub(crate) use calibration::{CALIBRATION, Places};
+pub(crate) use device_profile::{INTEGER, REAL};
 pub use faults::FAULTS;
 pub(crate) use faults::SENSOR_BREAK;
 pub(crate) use manufacturer::{STATUS_AND_USER, STATUS_REGISTER};
-pub(crate) use profile::{INTEGER, REAL};
 pub use values::Fields;
 
 use canopen::dictionary::{self, Dictionary, Entry, Object};
@@ -23,12 +23,12 @@ use crate::communication::{device_name, device_type, error_behaviour};
 use crate::fault::{Fault, Flags};
 use crate::profile::Profile;
 
-/// CiA 404, two analogue input blocks.
+/// Device type: CiA 404, two analogue input blocks.
 pub(crate) const DEVICE_TYPE: i64 = 0x0002_0194;
 
 static PDOS: [Object; dictionary::count(pdos::PARTS)] = dictionary::gather(pdos::PARTS);
 
-/// The rows of the transmitter as a device of its own, but for those that all devices have.
+/// The rows of a stand-alone transmitter, without the rows that all devices have.
 pub const ROWS: &[&[Object]] = &[
     &[device_type(DEVICE_TYPE)],
     STATUS_REGISTER,
@@ -41,19 +41,19 @@ pub const ROWS: &[&[Object]] = &[
     INTEGER,
 ];
 
-/// Where the values are in the image of that device.
+/// The places of the values in the image of that device.
 #[must_use]
 pub const fn fields(dictionary: &Dictionary) -> Fields {
     Fields::new(dictionary, 0)
 }
 
-/// Whether a write to this object is decided on here.
+/// Whether one of the transmitter's rules decides on a write to this object.
 #[must_use]
 pub const fn handles(index: u16, sub: u8) -> bool {
     handles_shifted(index, sub, 0)
 }
 
-/// The same where the objects of the device profile have their index plus `shift`.
+/// Like [`handles`], for a device in which `shift` is added to the indexes of the device profile.
 pub(crate) const fn handles_shifted(index: u16, sub: u8, shift: u16) -> bool {
     rules::Rule::shifted(index, sub, shift).is_some()
 }
@@ -68,7 +68,7 @@ impl Profile for Objects {
     type Chain = Transmitter;
     type Fields = Fields;
 
-    /// Bit 0 for every fault. The other bits are always 0 in a transmitter (CMP 8271, object 1001h).
+    /// Bit 0 is set for every fault. The other bits are always 0 in a transmitter (CMP 8271, object 1001h).
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {

@@ -1,5 +1,5 @@
-//! TPDO 1 and 2 are those of the transmitter, with neither a SYNC start value nor more than four mapped objects; the
-//! others wait for a use.
+//! TPDO 1 and 2 are those of the transmitter, without a SYNC start value and with at most four mapped objects. The
+//! other TPDOs are not used by default.
 
 use crate::communication::{
     RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, tpdo_mappings, tpdos, transmission_type,
@@ -36,7 +36,7 @@ const TRANSMITTER_MAPPING: &[Object] = &[
 const SPARE: [Tpdo; 6] =
     [Tpdo::spare(2), Tpdo::spare(3), Tpdo::spare(4), Tpdo::spare(5), Tpdo::spare(6), Tpdo::spare(7)];
 
-/// All of them, in the order of the table.
+/// All parts, in the order of the table.
 pub(super) const PARTS: &[&[Object]] = &[
     &RPDOS,
     &TPDO1,

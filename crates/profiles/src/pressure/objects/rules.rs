@@ -1,4 +1,4 @@
-//! What a write to an object of the transmitter means beyond storing a value.
+//! Checks and actions on writes to objects of the transmitter.
 
 use super::Fields;
 use super::calibration;
@@ -6,21 +6,21 @@ use crate::pressure::{STATUS_INVALID, Unit};
 use canopen::dictionary::Entry;
 use canopen::sdo::Abort;
 
-/// The rules of the transmitter's own objects.
+/// The rules for the transmitter's objects.
 #[derive(Clone, Copy)]
 pub(super) enum Rule {
     /// 6125h: the present process value becomes 0.
     Autozero,
-    /// 6131h:1 takes units of a pressure.
+    /// 6131h:1: only units of pressure are accepted.
     PressureUnit,
-    /// 6131h:2 takes units of a temperature.
+    /// 6131h:2: only units of temperature are accepted.
     TemperatureUnit,
-    /// 2200h to 2203h.
+    /// 2200h to 2203h: the calibration.
     Calibration(calibration::Rule),
 }
 
 impl Rule {
-    /// The rule of an object of the device profile, by its index without a shift, or of the manufacturer's range.
+    /// The rule of an object: in the device profile, by its index without a shift; or in the manufacturer's range.
     pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
         match (index, sub) {
             (0x6125, 1..) => Some(Rule::Autozero),
@@ -33,17 +33,17 @@ impl Rule {
         }
     }
 
-    /// The same where the objects of the device profile have their index plus `shift`.
+    /// Like [`Rule::of`], for a device in which `shift` is added to the indexes of the device profile.
     pub(super) const fn shifted(index: u16, sub: u8, shift: u16) -> Option<Rule> {
         if index < 0x6000 { Rule::of(index, sub) } else { Rule::of(index.wrapping_sub(shift), sub) }
     }
 }
 
-/// What 6125h takes: "zero".
+/// The value of 6125h that starts the autozero: "zero".
 const ZERO_SIGNATURE: [u8; 4] = *b"zero";
 
 impl Fields {
-    /// Decides on a write to an object with one of the rules above.
+    /// Checks a write to an object that has one of the rules above.
     pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let is_known = match Rule::shifted(entry.index(), entry.sub(), self.shift) {
@@ -56,7 +56,7 @@ impl Fields {
         if is_known { Ok(()) } else { Err(Abort::InvalidValue) }
     }
 
-    /// Moves the offset so that the present process value becomes 0. A value that is not valid is no reference.
+    /// Changes the offset so that the present process value becomes 0. Refused while the value is not valid.
     fn autozero(&self, sub: u8, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         if bytes != ZERO_SIGNATURE {
             return Err(Abort::NotStored);

@@ -1,11 +1,11 @@
-//! Measured values into the image, parameters out of it.
+//! Transfer of measured values into the image, and of parameters out of the image.
 
 use super::calibration::Places;
 use super::faults::FlagFields;
 use crate::pressure::{ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
 use canopen::dictionary::{Dictionary, Field};
 
-/// Where the values of one channel are.
+/// The places of one channel's values.
 #[derive(Debug)]
 pub(super) struct Channel {
     field_value: Field,
@@ -25,14 +25,14 @@ pub(super) struct Channel {
     filter_constant: Field,
 }
 
-/// Where the transmitter's values are in the image of a dictionary that has its objects.
+/// The places of the transmitter's values in the image of a dictionary with the transmitter's objects.
 #[derive(Debug)]
 pub struct Fields {
     pub(super) pressure: Channel,
     pub(super) temperature: Channel,
     pub(super) calibration: Places,
     pub(super) flags: FlagFields,
-    /// Added to the index of every object of the profile.
+    /// Added to the index of every object of the device profile.
     pub(super) shift: u16,
 }
 
@@ -86,7 +86,7 @@ impl Channel {
 }
 
 impl Fields {
-    /// Looks them up, during compilation; every object of the profile has its index plus `shift`.
+    /// Looks the fields up during compilation; `shift` is added to the index of every object of the device profile.
     pub(crate) const fn new(d: &Dictionary, shift: u16) -> Fields {
         Fields {
             pressure: Channel::new(d, shift, 1),
@@ -97,13 +97,13 @@ impl Fields {
         }
     }
 
-    /// Takes a snapshot into the image.
+    /// Copies a snapshot into the image.
     pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
         self.pressure.publish(&snapshot.pressure, image);
         self.temperature.publish(&snapshot.temperature, image);
     }
 
-    /// The parameters in the image. A unit that no write could have put there acts as the default one.
+    /// The parameters in the image. An impossible unit acts as the default one.
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         let pressure = Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR);
         let temperature = Unit::temperature(self.temperature.unit.u32(image)).unwrap_or(Unit::CELSIUS);

@@ -1,4 +1,5 @@
-//! The profile that docs/extending.md adds: two switches that are counted, and two lamps. All of it is in this folder.
+//! The profile that docs/extending.md adds: two switches that are counted, and two lamps. The whole profile is in this
+//! folder.
 
 mod rows;
 
@@ -8,21 +9,21 @@ use profiles::board::{DIGITAL_INPUTS, DIGITAL_OUTPUTS, Inputs, Outputs, PowerOn}
 use profiles::fault::Fault;
 use profiles::profile::{Chain, Profile};
 
-/// The rows, but for those that all devices have.
+/// The rows, without the rows that all devices have.
 pub(crate) const ROWS: &[&[Object]] = rows::ROWS;
 
-/// It finds no fault.
+/// The profile detects no faults.
 pub(crate) const FAULTS: &[Fault] = &[];
 
-/// Which switches count when they open, not when they close (6002h): bit n for switch n.
+/// Switches that count when they open instead of when they close (6002h): bit n for switch n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Parameters {
     polarity: u8,
-    /// How often the counters were set to zero.
+    /// Number of times that the counters were set to zero.
     resets: u8,
 }
 
-/// What was counted.
+/// States and counters of the switches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Snapshot {
     state: u8,
@@ -63,7 +64,7 @@ impl Chain for Counters {
     }
 }
 
-/// Where the values are.
+/// The places of the values.
 #[derive(Debug)]
 pub(crate) struct Fields {
     state: Field,
@@ -73,7 +74,7 @@ pub(crate) struct Fields {
     lamps: Field,
 }
 
-/// Looks them up, during compilation.
+/// Looks the fields up during compilation.
 pub(crate) const fn fields(d: &Dictionary) -> Fields {
     Fields {
         state: d.field(0x6000, 1),
@@ -84,7 +85,7 @@ pub(crate) const fn fields(d: &Dictionary) -> Fields {
     }
 }
 
-/// Whether a write to this object is decided on here: 2401h sets the counters to zero.
+/// Whether the profile decides on a write to this object: 2401h sets the counters to zero.
 pub(crate) const fn handles(index: u16, sub: u8) -> bool {
     matches!((index, sub), (0x2401, 0))
 }

@@ -1,4 +1,4 @@
-//! The objects: those of CiA 401 for eight digital inputs and outputs, and counters of the manufacturer.
+//! The objects of CiA 401 for eight digital inputs and outputs, and manufacturer-specific counters.
 
 use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, Type};
 use profiles::communication::{RPDOS, Tpdo, device_name, device_type, error_behaviour, tpdo_mappings, tpdos};

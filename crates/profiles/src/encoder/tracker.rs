@@ -1,27 +1,27 @@
-//! Where the shaft is, counted without end.
+//! Position of the shaft, counted without end.
 
 use core::num::{NonZeroU32, NonZeroU64};
 
 /// A mechanical position in native steps: whole turns since some origin, and the step within one.
 ///
-/// A turn is a revolution of a rotary encoder; for a linear one, [`Scale::turn`](super::Scale::turn) says what it is.
+/// A turn is a revolution of a rotary encoder; for a linear encoder, see [`Scale::turn`](super::Scale::turn).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Shaft {
+pub struct ShaftPosition {
     /// Whole turns, negative below the origin.
     pub turns: i64,
     /// Native step within the turn, below the steps per turn.
     pub step: u32,
 }
 
-impl Shaft {
+impl ShaftPosition {
     /// The shaft at `total` steps from its origin.
     #[must_use]
-    pub fn at(total: i64, turn: NonZeroU32) -> Shaft {
+    pub fn at(total: i64, turn: NonZeroU32) -> ShaftPosition {
         let turns = div_floor(total, turn);
-        Shaft { turns, step: remainder(total, turns, turn) }
+        ShaftPosition { turns, step: remainder(total, turns, turn) }
     }
 
-    /// Steps from its origin, modulo 2^64.
+    /// Steps from the origin, modulo 2^64.
     #[must_use]
     pub fn total(self, turn: NonZeroU32) -> i64 {
         self.turns.wrapping_mul(turn.get().into()).wrapping_add(self.step.into())
@@ -30,15 +30,15 @@ impl Shaft {
 
 /// Follows a counter that wraps (a 16-bit timer, a single-turn or multi-turn word) without losing turns.
 ///
-/// Between two readings the shaft may move less than half of what the counter can tell apart; a faster shaft is
-/// taken for a slower one in the other direction, as with every counter.
+/// Between two readings the shaft may move less than half of the counter's range; a faster shaft looks like a slower
+/// one in the other direction, as with every counter.
 #[derive(Clone, Copy, Debug)]
 pub struct Tracker {
     turn: NonZeroU32,
-    /// Bits of a word that the counter does not have.
+    /// Number of bits of a word that the counter does not use.
     unused: u32,
     word: u32,
-    shaft: Shaft,
+    shaft: ShaftPosition,
     count: u32,
 }
 
@@ -46,7 +46,13 @@ impl Tracker {
     /// A counter of `bits` bits, 1 to 32, that reads `word` while the shaft is `total` steps from its origin.
     #[must_use]
     pub fn new(turn: NonZeroU32, bits: u32, word: u32, total: i64) -> Tracker {
-        Tracker { turn, unused: 32 - bits.clamp(1, 32), word, shaft: Shaft::at(total, turn), count: 0 }
+        Tracker {
+            turn,
+            unused: 32 - bits.clamp(1, 32),
+            word,
+            shaft: ShaftPosition::at(total, turn),
+            count: 0,
+        }
     }
 
     /// Steps from the last reading to this one, the shorter way.
@@ -64,11 +70,11 @@ impl Tracker {
         moved
     }
 
-    /// Puts the shaft elsewhere, though it has not moved.
+    /// Corrects the position without a movement.
     pub fn correct(&mut self, steps: i64) {
         let step = i64::from(self.shaft.step).wrapping_add(steps);
         let turn = i64::from(self.turn.get());
-        // A shaft turns less than once in a sample: the division is for what never happens.
+        // A shaft turns less than once in a sample, so the division is hardly ever needed.
         let turns = match step {
             _ if step < -turn || step >= 2 * turn => div_floor(step, self.turn),
             _ if step < 0 => -1,
@@ -81,14 +87,14 @@ impl Tracker {
     /// Counts in turns of another length from now on.
     pub fn set_turn(&mut self, turn: NonZeroU32) {
         if turn != self.turn {
-            self.shaft = Shaft::at(self.total(), turn);
+            self.shaft = ShaftPosition::at(self.total(), turn);
             self.turn = turn;
         }
     }
 
-    /// Where the shaft was at the last reading.
+    /// Position of the shaft at the last reading.
     #[must_use]
-    pub fn shaft(&self) -> Shaft {
+    pub fn shaft(&self) -> ShaftPosition {
         self.shaft
     }
 
@@ -98,10 +104,10 @@ impl Tracker {
         self.shaft.total(self.turn)
     }
 
-    /// The step within a turn of this length. Of the tracker's own length it needs no division.
+    /// The step within a turn of this length. No division is needed if the tracker counts in that length.
     #[must_use]
     pub fn step_in(&self, turn: NonZeroU32) -> u32 {
-        if turn == self.turn { self.shaft.step } else { Shaft::at(self.total(), turn).step }
+        if turn == self.turn { self.shaft.step } else { ShaftPosition::at(self.total(), turn).step }
     }
 
     /// The last reading.
@@ -110,7 +116,7 @@ impl Tracker {
         self.word
     }
 
-    /// All movement since the start, in steps modulo 2^32; a correction is none.
+    /// All movement since the start, in steps modulo 2^32, without corrections.
     #[must_use]
     pub fn count(&self) -> u32 {
         self.count
@@ -125,7 +131,7 @@ fn div_floor(value: i64, divisor: NonZeroU32) -> i64 {
     if value >= 0 { quotient(value.unsigned_abs()) } else { -quotient(value.unsigned_abs() - 1) - 1 }
 }
 
-/// What is left of `value` after so many turns; less than one is.
+/// Remainder of `value` after `turns` turns, less than one turn.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn remainder(value: i64, turns: i64, turn: NonZeroU32) -> u32 {
     value.wrapping_sub(turns.wrapping_mul(turn.get().into())) as u32
@@ -145,10 +151,10 @@ mod tests {
         for (total, turns, step) in
             [(0, 0, 0), (9, 0, 9), (10, 1, 0), (-1, -1, 9), (-10, -1, 0), (-11, -2, 9), (-20, -2, 0)]
         {
-            assert_eq!(Shaft::at(total, TEN), Shaft { turns, step }, "{total}");
+            assert_eq!(ShaftPosition::at(total, TEN), ShaftPosition { turns, step }, "{total}");
             let mut tracker = Tracker::new(TEN, 16, 0, 0);
             tracker.correct(total);
-            assert_eq!(tracker.shaft(), Shaft { turns, step }, "{total}");
+            assert_eq!(tracker.shaft(), ShaftPosition { turns, step }, "{total}");
         }
     }
 
@@ -161,7 +167,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against a plain sum of the movements.
+        /// Compares with a plain sum of the movements.
         #[test]
         fn follows_any_movement_below_half_the_counter(
             turn in 1..=u32::MAX, bits in 2..=32_u32, start in -(1_i64 << 60)..1 << 60,
@@ -205,9 +211,9 @@ mod tests {
         let turn = NonZeroU32::new(4096).unwrap();
         let mut tracker = Tracker::new(turn, 32, u32::MAX, 5 * 4096 + 4095);
         assert_eq!(tracker.follow(0), 1);
-        assert_eq!(tracker.shaft(), Shaft { turns: 6, step: 0 });
+        assert_eq!(tracker.shaft(), ShaftPosition { turns: 6, step: 0 });
         assert_eq!(tracker.follow(u32::MAX - 1), -2);
-        assert_eq!(tracker.shaft(), Shaft { turns: 5, step: 4094 });
+        assert_eq!(tracker.shaft(), ShaftPosition { turns: 5, step: 4094 });
     }
 
     #[test]
@@ -216,7 +222,7 @@ mod tests {
         let mut tracker = Tracker::new(turn, 16, 0, 0);
         tracker.follow(30);
         tracker.correct(-40);
-        assert_eq!((tracker.shaft(), tracker.count()), (Shaft { turns: -1, step: 90 }, 30));
+        assert_eq!((tracker.shaft(), tracker.count()), (ShaftPosition { turns: -1, step: 90 }, 30));
         tracker.follow(35);
         assert_eq!(tracker.total(), -5);
     }

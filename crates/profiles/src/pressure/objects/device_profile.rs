@@ -1,4 +1,4 @@
-//! Device profile objects, 6000h to 9FFFh (CiA 404): sub-index 1 is the pressure, sub-index 2 the temperature.
+//! Device profile objects, 6000h to 9FFFh (CiA 404). Sub-index 1 is the pressure, sub-index 2 the temperature.
 
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
@@ -35,10 +35,10 @@ const fn filter_constant(sub: u8, name: &'static str) -> Object {
     parameter(0x61A1, sub, name, Type::Unsigned8).limits(1, 255).value(1)
 }
 
-/// Unit of a process value: what 6131h selects.
+/// Unit of a process value, selected by 6131h.
 const PV: &str = "6131h";
 
-/// In REAL32, and what is common to all formats: 6000h to 6FFFh.
+/// Objects in REAL32, and objects for all formats: 6000h to 6FFFh.
 pub(crate) const REAL: &[Object] = &[
     both(0x6100, "AI input field value"),
     measured(0x6100, 1, "Pressure field value", Type::Real32).unit("Pa"),
@@ -84,7 +84,7 @@ pub(crate) const REAL: &[Object] = &[
     filter_constant(2, "Temperature filter constant"),
 ];
 
-/// In integers: 7000h to 9FFFh.
+/// Objects in integer formats: 7000h to 9FFFh.
 pub(crate) const INTEGER: &[Object] = &[
     both(0x7130, "AI input process value INTEGER16"),
     measured(0x7130, 1, "Pressure process value INTEGER16", Type::Integer16).unit(PV),

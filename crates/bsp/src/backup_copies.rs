@@ -1,11 +1,11 @@
-//! A few words in the backup SRAM, written every millisecond, while the power may fail at any moment.
+//! A few words in the backup SRAM, written every millisecond, although the power may fail at any moment.
 //!
-//! There are two copies, each with a sequence number and a CRC. A write goes over the older copy. A write that the loss of power
-//! cuts short damages that copy only; the other copy is good, and one write old.
+//! There are two copies, each with a sequence number and a CRC. A write overwrites the older copy. A loss of power
+//! during the write damages that copy only; the other copy is valid, and one write older.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Words that a copy holds.
+/// Number of words in a copy.
 pub const CAPACITY: usize = 10;
 
 const _: () = assert!(CAPACITY.is_multiple_of(2), "words are written in pairs");
@@ -13,10 +13,10 @@ const _: () = assert!(CAPACITY.is_multiple_of(2), "words are written in pairs");
 /// The words of a copy.
 pub type Content = [u32; CAPACITY];
 
-/// Tells a damaged copy from memory that never held one, or one of another layout.
+/// Distinguishes a damaged copy from memory that never held a copy, or a copy of another layout.
 const MARK: u32 = 0x4B45_5032;
 
-/// The place of a copy in memory.
+/// A copy in memory.
 #[derive(Debug)]
 #[repr(C)]
 pub struct Slot {
@@ -26,41 +26,41 @@ pub struct Slot {
     checksum: AtomicU32,
 }
 
-/// The places of both.
+/// Both copies.
 pub type Slots = [Slot; 2];
 
 /// Content of the memory at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
-    /// No trace of a copy: nothing was ever written, or the battery was empty.
+pub enum BackupState {
+    /// Neither copy exists: nothing was ever written, or the battery was empty.
     Nothing,
     /// The record that was written last.
-    Kept(Content),
-    /// A copy was there, and none is good.
+    Intact(Content),
+    /// At least one copy exists, but none is valid.
     Damaged,
 }
 
-/// A CRC of 32 bits over words, the sequence number first.
+/// A 32-bit CRC over words, the sequence number first.
 pub trait Checksum {
-    /// Begins with this word.
+    /// Starts with this word.
     fn start(&mut self, word: u32);
-    /// Goes on with this one.
+    /// Adds this word.
     fn add(&mut self, word: u32);
-    /// The CRC of all of them.
+    /// The CRC of all words.
     fn value(&self) -> u32;
 }
 
-/// Writes the copies in turn.
-pub struct Keeper<'a, C> {
+/// Writes the two copies alternately.
+pub struct BackupCopies<'a, C> {
     slots: &'a Slots,
     checksum: C,
-    /// The sequence number of the latest copy. An even number belongs to the first place, an odd one to the second.
+    /// The sequence number of the newer copy. Even numbers belong to the first place, odd numbers to the second.
     sequence: u32,
 }
 
-impl<'a, C: Checksum> Keeper<'a, C> {
-    /// Finds the newer of the good copies. The next write goes over the other place.
-    pub fn open(slots: &'a Slots, mut checksum: C) -> (Keeper<'a, C>, Found) {
+impl<'a, C: Checksum> BackupCopies<'a, C> {
+    /// Finds the newer of the valid copies. The next write overwrites the other one.
+    pub fn open(slots: &'a Slots, mut checksum: C) -> (BackupCopies<'a, C>, BackupState) {
         let [first, second] = slots.each_ref().map(|slot| slot.read(&mut checksum));
         let good = [first.filter(|copy| copy.0 % 2 == 0), second.filter(|copy| copy.0 % 2 == 1)];
         let newer = match good {
@@ -69,14 +69,14 @@ impl<'a, C: Checksum> Keeper<'a, C> {
         };
         let had_one = slots.iter().any(Slot::has_mark);
         let (sequence, found) = match newer {
-            Some((sequence, content)) => (sequence, Found::Kept(content)),
-            None => (0, if had_one { Found::Damaged } else { Found::Nothing }),
+            Some((sequence, content)) => (sequence, BackupState::Intact(content)),
+            None => (0, if had_one { BackupState::Damaged } else { BackupState::Nothing }),
         };
-        (Keeper { slots, checksum, sequence }, found)
+        (BackupCopies { slots, checksum, sequence }, found)
     }
 
-    /// Writes the older copy. False when the memory has not taken the words: the next write goes to the same place, and the newer
-    /// copy stays.
+    /// Overwrites the older copy. False if the memory has not taken the words: the next write goes to the same place,
+    /// and the newer copy is unchanged.
     pub fn write(&mut self, content: &Content) -> bool {
         let next = self.sequence.wrapping_add(1);
         let [even, odd] = self.slots;
@@ -94,7 +94,7 @@ impl Slot {
         self.mark.load(Ordering::Relaxed) == MARK
     }
 
-    /// The sequence number and the content of a copy that is good.
+    /// The sequence number and the content of a valid copy.
     fn read(&self, checksum: &mut impl Checksum) -> Option<(u32, Content)> {
         let sequence = self.sequence.load(Ordering::Relaxed);
         let content = self.content.each_ref().map(|word| word.load(Ordering::Relaxed));
@@ -106,12 +106,12 @@ impl Slot {
         is_good.then_some((sequence, content))
     }
 
-    /// The mark comes last: where a first write is cut short there was nothing, and not something that is damaged. Whether the
-    /// first and the last words read back: memory that is locked or has no clock takes none.
+    /// Writes a copy. The mark comes last, so a first write that is cut short counts as nothing written, not as damage.
+    /// Returns whether the first and the last words read back: memory that is locked or has no clock takes none.
     fn write(&self, sequence: u32, content: &Content, checksum: &mut impl Checksum) -> bool {
         self.sequence.store(sequence, Ordering::Relaxed);
         checksum.start(sequence);
-        // Two at a time: the loop itself takes as long as a word.
+        // Two words at a time, because the loop itself takes as long as a word.
         let (to, from) = (self.content.as_chunks().0, content.as_chunks().0);
         for ([first_to, second_to], [first, second]) in to.iter().zip(from) {
             first_to.store(*first, Ordering::Relaxed);
@@ -143,7 +143,7 @@ mod tests {
 
     static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_MPEG_2);
 
-    /// The CRC as the unit of the chip computes it.
+    /// The CRC as computed by the chip's CRC unit.
     struct Software(Digest<'static, u32>);
 
     impl Checksum for Software {
@@ -172,7 +172,7 @@ mod tests {
             }
         }
 
-        /// In the order of a write.
+        /// The words in the order of a write.
         fn words(&self) -> impl Iterator<Item = &AtomicU32> {
             let inner = [&self.sequence].into_iter().chain(&self.content);
             inner.chain([&self.checksum, &self.mark])
@@ -183,30 +183,30 @@ mod tests {
         core::array::from_fn(|_| Slot::filled(word))
     }
 
-    fn open(slots: &Slots) -> (Keeper<'_, Software>, Found) {
-        Keeper::open(slots, Software(CRC.digest()))
+    fn open(slots: &Slots) -> (BackupCopies<'_, Software>, BackupState) {
+        BackupCopies::open(slots, Software(CRC.digest()))
     }
 
-    fn found(slots: &Slots) -> Found {
+    fn found(slots: &Slots) -> BackupState {
         open(slots).1
     }
 
-    /// The record that `write` makes of this number.
+    /// The content that write number `number` writes in these tests.
     fn content(number: u32) -> Content {
         core::array::from_fn(|n| number.wrapping_mul(0x9E37_79B9).rotate_left(u32::try_from(n).unwrap()))
     }
 
     fn written(writes: u32) -> Slots {
         let slots = memory(0xA5A5_A5A5);
-        let mut keeper = open(&slots).0;
-        (1..=writes).for_each(|number| assert!(keeper.write(&content(number))));
+        let mut copies = open(&slots).0;
+        (1..=writes).for_each(|number| assert!(copies.write(&content(number))));
         slots
     }
 
     #[test]
     fn memory_that_was_never_written_has_nothing() {
         for word in [0, u32::MAX, 0xA5A5_A5A5] {
-            assert_eq!(found(&memory(word)), Found::Nothing);
+            assert_eq!(found(&memory(word)), BackupState::Nothing);
         }
     }
 
@@ -214,24 +214,25 @@ mod tests {
     fn the_latest_is_found_and_goes_on() {
         for writes in 1..=5 {
             let slots = written(writes);
-            let (mut keeper, found) = open(&slots);
-            assert_eq!(found, Found::Kept(content(writes)));
-            keeper.write(&content(100));
-            assert_eq!(open(&slots).1, Found::Kept(content(100)));
+            let (mut copies, found) = open(&slots);
+            assert_eq!(found, BackupState::Intact(content(writes)));
+            copies.write(&content(100));
+            assert_eq!(open(&slots).1, BackupState::Intact(content(100)));
         }
     }
 
     #[test]
     fn the_sequence_may_wrap() {
         let slots = memory(0);
-        let mut keeper = Keeper { slots: &slots, checksum: Software(CRC.digest()), sequence: u32::MAX - 3 };
+        let mut copies =
+            BackupCopies { slots: &slots, checksum: Software(CRC.digest()), sequence: u32::MAX - 3 };
         for number in 0..8 {
-            keeper.write(&content(number));
-            assert_eq!(found(&slots), Found::Kept(content(number)));
+            copies.write(&content(number));
+            assert_eq!(found(&slots), BackupState::Intact(content(number)));
         }
     }
 
-    /// The power goes after any number of the words of a write, in the order in which they are written.
+    /// The power fails after any number of the words of a write, in the order of the write.
     #[test]
     fn a_write_that_is_cut_short_leaves_the_one_before() {
         for writes in 0..4 {
@@ -242,10 +243,11 @@ mod tests {
                 for (to, from) in slots[target].words().zip(next[target].words()).take(done) {
                     to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
                 }
-                let expected = if writes == 0 { Found::Nothing } else { Found::Kept(content(writes)) };
-                // From the second round on the mark is there already: without it the write is complete.
+                let expected =
+                    if writes == 0 { BackupState::Nothing } else { BackupState::Intact(content(writes)) };
+                // From the second round on the mark is already there, so the write is complete without it.
                 let is_whole = writes >= 2 && done == WORDS - 1;
-                let expected = if is_whole { Found::Kept(content(writes + 1)) } else { expected };
+                let expected = if is_whole { BackupState::Intact(content(writes + 1)) } else { expected };
                 assert_eq!(found(&slots), expected, "{writes} writes and {done} words");
             }
         }
@@ -253,13 +255,13 @@ mod tests {
 
     #[test]
     fn any_flipped_bit_of_both_copies_is_damage() {
-        // All but the mark, without which there is no copy.
+        // All words but the mark, without which there is no copy.
         for bit in 0..(WORDS - 1) * 32 {
             let slots = written(2);
             for slot in &slots {
                 slot.words().nth(bit / 32).unwrap().fetch_xor(1 << (bit % 32), Ordering::Relaxed);
             }
-            assert_eq!(found(&slots), Found::Damaged, "bit {bit}");
+            assert_eq!(found(&slots), BackupState::Damaged, "bit {bit}");
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Device profile objects, 6000h to 65FFh (CiA 406, classes C1 and C2): sub-index n is channel n.
+//! Device profile objects, 6000h to 65FFh (CiA 406, classes C1 and C2). Sub-index n is channel n.
 
 use crate::encoder::{SUPPORTED_ALARMS, SUPPORTED_WARNINGS};
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
-/// CiA 406 v3.0.
+/// Version of CiA 406: 3.0.
 const PROFILE_VERSION: u16 = 0x0300;
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -22,12 +22,12 @@ const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object
     fixed(index, sub, name, kind).mappable(Mapping::Tpdo)
 }
 
-/// A preset finds it, and it is stored with the parameters.
+/// The offset that a preset has found, stored with the parameters.
 const fn stored_offset(sub: u8, name: &'static str) -> Object {
     fixed(0x650C, sub, name, Type::Integer32).unit("units").stored(Group::Application)
 }
 
-/// Both channels of something that is measured: the names of the object and of its channels.
+/// Both channels of a measured value. `names`: the object, then its channels.
 const fn values(index: u16, names: [&'static str; 3], kind: Type) -> [Object; 3] {
     let [name, one, two] = names;
     [Object::highest(index, 2, name), measured(index, 1, one, kind), measured(index, 2, two, kind)]
@@ -73,7 +73,7 @@ const POSITION: [Object; 3] = values(
 const SPEED: [Object; 3] =
     values(0x6030, ["Speed values", "Speed value channel 1", "Speed value channel 2"], Type::Integer16);
 
-/// Hard-wired to 1800h:5, and saved as that.
+/// Hard-wired to 1800h:5, and saved there.
 const TIMER: &[Object] = &[Object::new(0x6200, 0, "Cyclic timer", Type::Unsigned16, Access::ReadWrite)
     .unit("ms")
     .event_timer_of(0)];
@@ -154,8 +154,8 @@ const DIAGNOSTICS: &[Object] = &[
     stored_offset(2, "Offset value channel 2"),
 ];
 
-/// 6507h: the profile in the low word, the software in the high word, each with a digit in four bits: version 1.40 is
-/// 0140h, and so is 1.4.0. The software is that of 100Ah.
+/// 6507h: the profile version in the low word, the software version (that of 100Ah) in the high word. Each number is a
+/// digit in four bits: version 1.40 is 0140h, and so is 1.4.0.
 const fn versions() -> i64 {
     let major = digit(env!("CARGO_PKG_VERSION_MAJOR"));
     let minor = digit(env!("CARGO_PKG_VERSION_MINOR"));
@@ -171,7 +171,7 @@ const fn digit(text: &str) -> i64 {
     }
 }
 
-/// All of them, in the order of the table.
+/// All parts, in the order of the table.
 pub(super) const PARTS: &[&[Object]] = &[
     PARAMETERS,
     &POSITION,

@@ -1,48 +1,49 @@
-//! What the parameter store holds that nobody asks for: what a start without a battery has to know of the positions. It lies
-//! behind the device record, in the same value: facts of the device, which no 1011h touches.
+//! Record about the retained state, which no object shows: the data about positions that a start with an empty battery
+//! needs. It is stored behind the device record, in the same value. Both are facts of the device, which 1011h does not
+//! affect.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
-use profiles::board::{LASTING_WORDS, RETAINED_WORDS};
-use profiles::encoder::Lasting;
-use storage::{Change, DeviceRecord, Error, Group, Loaded, Store, View};
+use profiles::board::{POSITION_RECORD_WORDS, RETAINED_WORDS};
+use profiles::encoder::PositionRecord;
+use storage::{Change, DeviceRecord, Error, Loaded, ParameterGroup, Store, View};
 
 /// The bytes of a device record.
 type Device = [u8; DeviceRecord::LEN];
-/// The bytes of a value of the group: the device record, and what lies behind it.
+/// The bytes of a stored value: the device record, and the record about the retained state.
 type Value = [u8; DeviceRecord::ROOM];
 
 /// Bytes behind the device record.
-const TAIL: usize = 4 * LASTING_WORDS;
+const TAIL: usize = 4 * POSITION_RECORD_WORDS;
 const WHOLE: usize = DeviceRecord::LEN + TAIL;
 const _: () = assert!(WHOLE <= DeviceRecord::ROOM);
 
-/// Keeps it up to date.
+/// Keeps the stored record up to date.
 #[derive(Debug)]
-pub struct LastingRecord {
-    /// As it is stored, or could not be.
-    stored: Option<Lasting>,
-    /// As this run has found it.
-    start: Option<Lasting>,
+pub struct StoredPositionRecord {
+    /// The record as stored, or as it was when storing it last failed.
+    stored: Option<PositionRecord>,
+    /// The record at the start of this run.
+    start: Option<PositionRecord>,
 }
 
-impl LastingRecord {
-    /// Goes on from what [`read`](LastingRecord::read) has found.
+impl StoredPositionRecord {
+    /// Continues from the result of [`read`](StoredPositionRecord::read).
     #[must_use]
-    pub fn new(found: Option<[u32; LASTING_WORDS]>) -> LastingRecord {
-        LastingRecord { stored: found.map(Lasting::from_words), start: None }
+    pub fn new(found: Option<[u32; POSITION_RECORD_WORDS]>) -> StoredPositionRecord {
+        StoredPositionRecord { stored: found.map(PositionRecord::from_words), start: None }
     }
 
-    /// The stored value; `None` where nothing is stored, or nothing that can be read.
-    pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; LASTING_WORDS]> {
+    /// The stored record; `None` if nothing is stored, or nothing that can be read.
+    pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; POSITION_RECORD_WORDS]> {
         let mut value: Value = [0; DeviceRecord::ROOM];
-        let loaded = view.load(Group::Device, &mut value);
+        let loaded = view.load(ParameterGroup::Device, &mut value);
         let tail = tail(loaded, &value)?.as_chunks::<4>().0;
-        let words: &[[u8; 4]; LASTING_WORDS] = tail.try_into().ok()?;
+        let words: &[[u8; 4]; POSITION_RECORD_WORDS] = tail.try_into().ok()?;
         Some(words.map(u32::from_le_bytes))
     }
 
-    /// Stores what has changed in the words that a profile retains, when it is worth a write: see [`Lasting::is_due`].
-    /// `device` is the device record as it is stored or would be. Whether it has written.
+    /// Stores changes of the words that a profile retains when they are due: see [`PositionRecord::is_due`]. `device`
+    /// is the device record, as stored or as it would be stored. Returns whether the store was written.
     ///
     /// # Errors
     /// Errors of [`Store::save`]. The next due time tries again.
@@ -52,7 +53,7 @@ impl LastingRecord {
         device: &Device,
         store: &mut Store<F>,
     ) -> Result<bool, Error<F::Error>> {
-        let now = Lasting::of(retained);
+        let now = PositionRecord::of(retained);
         let start = *self.start.get_or_insert(now);
         if self.stored.is_some_and(|stored| !now.is_due(stored, start)) {
             return Ok(false);
@@ -67,13 +68,13 @@ impl LastingRecord {
     }
 }
 
-/// Replaces the device record, and leaves what lies behind it.
+/// Replaces the device record, and keeps the bytes behind it.
 pub(crate) fn replace_device<F: NorFlash>(
     device: Device,
     store: &mut Store<F>,
 ) -> Result<(), Error<F::Error>> {
     let mut value: Value = [0; DeviceRecord::ROOM];
-    let loaded = store.load(Group::Device, &mut value);
+    let loaded = store.load(ParameterGroup::Device, &mut value);
     save(device, tail(loaded, &value).unwrap_or_default(), store)
 }
 
@@ -88,7 +89,7 @@ fn save<F: NorFlash>(device: Device, tail: &[u8], store: &mut Store<F>) -> Resul
     let mut value: Value = [0; DeviceRecord::ROOM];
     value.iter_mut().zip(device.iter().chain(tail)).for_each(|(to, from)| *to = *from);
     let value = value.get(..DeviceRecord::LEN + tail.len()).unwrap_or(&value);
-    store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value }])
+    store.save(&[Change::Set { group: ParameterGroup::Device, version: DeviceRecord::VERSION, value }])
 }
 
 #[cfg(test)]
@@ -100,7 +101,7 @@ mod tests {
     /// Node 5 at 250 kbit/s.
     const DEVICE: Device = [5, 1, 250, 0];
 
-    /// The words of a profile that has worked for so many tenths of an hour.
+    /// The retained words of a profile with this operating time in tenths of an hour.
     fn retained(tenths: u32) -> [u32; RETAINED_WORDS] {
         let mut words = [0; RETAINED_WORDS];
         words[RETAINED_WORDS - 2] = tenths;
@@ -112,16 +113,16 @@ mod tests {
         let mut flash = [0xFF; 8 * 1024];
         let view = View::open(Memory(&mut flash[..]), PAGES).unwrap();
         let mut store = Store::prepare(view).unwrap();
-        let mut record = LastingRecord::new(None);
+        let mut record = StoredPositionRecord::new(None);
         assert!(record.keep(&retained(0), &DEVICE, &mut store).unwrap(), "at once");
         assert!(!record.keep(&retained(9), &DEVICE, &mut store).unwrap());
         assert!(record.keep(&retained(10), &DEVICE, &mut store).unwrap(), "an hour later");
         let mut view = View::open(Memory(&flash[..]), PAGES).unwrap();
-        let found = LastingRecord::read(&mut view);
+        let found = StoredPositionRecord::read(&mut view);
         assert_eq!(found, Some([10, 0]));
         assert_eq!(view.device().unwrap().unwrap().encode(), DEVICE, "the device is who it was");
         let mut store = Store::prepare(View::open(Memory(&mut flash[..]), PAGES).unwrap()).unwrap();
-        assert!(!LastingRecord::new(found).keep(&retained(10), &DEVICE, &mut store).unwrap());
+        assert!(!StoredPositionRecord::new(found).keep(&retained(10), &DEVICE, &mut store).unwrap());
     }
 
     #[test]
@@ -129,10 +130,10 @@ mod tests {
         let mut flash = [0xFF; 8 * 1024];
         let mut store = Store::prepare(View::open(Memory(&mut flash[..]), PAGES).unwrap()).unwrap();
         replace_device(DEVICE, &mut store).unwrap();
-        LastingRecord::new(None).keep(&retained(7), &DEVICE, &mut store).unwrap();
+        StoredPositionRecord::new(None).keep(&retained(7), &DEVICE, &mut store).unwrap();
         replace_device([9, 1, 250, 0], &mut store).unwrap();
         let mut view = View::open(Memory(&flash[..]), PAGES).unwrap();
-        assert_eq!(LastingRecord::read(&mut view), Some([7, 0]));
+        assert_eq!(StoredPositionRecord::read(&mut view), Some([7, 0]));
         assert_eq!(view.device().unwrap().unwrap().node_id(), 9);
     }
 
@@ -140,6 +141,6 @@ mod tests {
     fn flash_without_a_record_has_none() {
         let flash = [0xFF; 8 * 1024];
         let mut view = View::open(Memory(&flash[..]), PAGES).unwrap();
-        assert_eq!(LastingRecord::read(&mut view), None);
+        assert_eq!(StoredPositionRecord::read(&mut view), None);
     }
 }

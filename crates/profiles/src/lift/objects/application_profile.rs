@@ -1,4 +1,4 @@
-//! Application profile objects, 6000h to 64FFh (CiA 417): of the position unit sub-index n is unit n.
+//! Application profile objects, 6000h to 64FFh (CiA 417). In objects of the position unit, sub-index n is unit n.
 
 use crate::encoder::SUPPORTED_WARNINGS;
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
@@ -15,17 +15,17 @@ const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object
     Object::new(index, sub, name, kind, Access::ReadOnly)
 }
 
-/// What another device of the lift may set by a multiplexed PDO.
+/// An object that another device of the lift may write by a multiplexed PDO.
 const fn taken(row: Object) -> Object {
     row.mappable(Mapping::Rpdo)
 }
 
-/// Process data: in a PDO of its own, or in the multiplexed one.
+/// Process data, sent in a PDO of its own or in the multiplexed PDO.
 const fn sent(row: Object) -> Object {
     row.mappable(Mapping::Tpdo)
 }
 
-/// The same row for each of four units. A macro, as names are made of literals.
+/// The same row for each of the four units. A macro, because names are made of literals.
 macro_rules! units {
     ($index:literal, $what:literal, $names:literal, $row:expr) => {
         [
@@ -38,7 +38,7 @@ macro_rules! units {
     };
 }
 
-/// Unit of positions: what 6384h:1 says.
+/// Unit of positions, defined by 6384h:1.
 const POSITION: &str = "6384h:1";
 
 const fn operating(sub: u8, name: &'static str) -> Object {
@@ -53,7 +53,8 @@ const fn position(sub: u8, name: &'static str) -> Object {
     sent(measured(0x6383, sub, name, Type::Unsigned32)).unit(POSITION)
 }
 
-/// Not for PDOs: no pre-defined one has it, and as a multiplexed PDO each change would be a frame, a thousand a second.
+/// Not mappable: no pre-defined PDO has the speed, and in the multiplexed PDO each change would be a frame, a thousand
+/// a second.
 const fn speed(sub: u8, name: &'static str) -> Object {
     measured(0x6390, sub, name, Type::Integer16).unit("6384h:2")
 }
@@ -90,12 +91,12 @@ const fn limit(sub: u8, name: &'static str) -> Object {
     taken(parameter(0x6483, sub, name, Type::Unsigned16)).unit("kg")
 }
 
-/// 0 behind the last of the list.
+/// A type in the list of virtual devices; 0 after the last one.
 const fn listed(sub: u8, name: &'static str) -> Object {
     measured(0x6000, sub, name, Type::Unsigned16)
 }
 
-/// All of them, in the order of the table.
+/// All parts, in the order of the table.
 pub(super) const PARTS: &[&[Object]] = &[
     &[
         Object::new(0x6000, 0, "Virtual devices", Type::Unsigned8, Access::ReadOnly),
@@ -103,7 +104,7 @@ pub(super) const PARTS: &[&[Object]] = &[
         listed(2, "Type of virtual device 2"),
         listed(3, "Type of virtual device 3"),
         listed(4, "Type of virtual device 4"),
-        // A bit for each lift. The PDOs are those of lift 1.
+        // One bit for each lift. The PDOs are those of lift 1.
         parameter(0x6001, 0, "Lift number", Type::Unsigned8).limits(1, 1).value(1),
         sent(measured(0x6010, 0, "Virtual input", Type::Unsigned48)),
         Object::new(0x6011, 0, "Virtual output", Type::Unsigned48, Access::ReadWrite).mappable(Mapping::Rpdo),
@@ -145,7 +146,7 @@ pub(super) const PARTS: &[&[Object]] = &[
         sent(measured(0x6480, 1, "Load value", Type::Unsigned16)).unit("kg"),
         Object::highest(0x6482, 1, "Load signals"),
         sent(measured(0x6482, 1, "Load signal", Type::Unsigned8)),
-        // 0: not signalled.
+        // A limit of 0 switches its signal off.
         Object::highest(0x6483, 4, "Load signalling limits"),
         limit(1, "Zero load limit"),
         limit(2, "Half load limit"),

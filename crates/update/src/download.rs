@@ -1,4 +1,4 @@
-//! The download: bytes in order, of any number at a time, programmed in chunks.
+//! The download: bytes in order, any number at a time, programmed in chunks.
 
 use crate::flash::{CHUNK, Flash, first, program};
 use crate::header::HEADER;
@@ -6,24 +6,24 @@ use crate::image;
 use crate::refusal::Refusal;
 use crate::target::{Target, image_len};
 
-/// A download under way.
+/// A download in progress.
 #[derive(Debug)]
-pub(crate) struct Receiver {
-    /// Bytes that are in flash.
+pub(crate) struct Download {
+    /// Number of bytes in flash.
     programmed: u32,
-    /// Bytes that wait for their chunk to be full.
+    /// Bytes of the incomplete chunk.
     held: [u8; CHUNK],
     count: usize,
-    /// Bytes that there will be, once the header is known.
+    /// Total number of bytes, once the header is known.
     expected: Option<u32>,
 }
 
-impl Receiver {
-    pub(crate) fn new() -> Receiver {
-        Receiver { programmed: 0, held: [0xFF; CHUNK], count: 0, expected: None }
+impl Download {
+    pub(crate) fn new() -> Download {
+        Download { programmed: 0, held: [0xFF; CHUNK], count: 0, expected: None }
     }
 
-    /// Bytes so far.
+    /// Number of bytes so far.
     pub(crate) fn received(&self) -> u32 {
         self.programmed.saturating_add(u32::try_from(self.count).unwrap_or(u32::MAX))
     }
@@ -49,7 +49,7 @@ impl Receiver {
         Ok(())
     }
 
-    /// The download is complete: programs the rest.
+    /// Ends the download: programs the rest.
     pub(crate) fn finish<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<(), Refusal> {
         match self.expected {
             Some(expected) if self.received() >= expected => self.flush(flash, target),
@@ -70,7 +70,7 @@ impl Receiver {
         self.look_at_header(flash, target)
     }
 
-    /// What is wrong with the header is said at once, not after minutes.
+    /// Checks the header as soon as it is complete, so that a wrong header is refused at once and not after minutes.
     fn look_at_header<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<(), Refusal> {
         if self.expected.is_none() && self.programmed >= HEADER {
             self.expected = Some(image_len(&image::candidate(flash, target)?));
