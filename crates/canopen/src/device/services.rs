@@ -17,6 +17,8 @@ const ERROR_CONTROL: u16 = 0x700;
 #[derive(Debug)]
 pub(super) struct Services {
     server: Server,
+    /// The CAN-ID of requests to the server.
+    sdo_request: CanId,
     /// When to try again to send a reply of the server that found the queue full.
     reply_due: Instant,
     /// When to go on with a block that found the queue full.
@@ -28,6 +30,7 @@ impl Services {
     pub(super) fn new(node_id: Option<NodeId>) -> Services {
         Services {
             server: Server::new(),
+            sdo_request: sdo_request(node_id),
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: Layer::new(node_id),
@@ -42,6 +45,7 @@ impl Services {
     pub(super) fn restart(&mut self) -> Option<NodeId> {
         self.forget_transfer();
         self.lss.restart();
+        self.sdo_request = sdo_request(self.lss.node_id());
         self.lss.node_id()
     }
 
@@ -56,11 +60,16 @@ impl Services {
     }
 }
 
+/// The CAN-ID of requests to the SDO server; that of no device without a node-ID.
+fn sdo_request(node_id: Option<NodeId>) -> CanId {
+    CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get))
+}
+
 impl<B: Body> Node<B> {
     /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        if self.services.server.takes_block() && self.take_segment(frame, now) {
+        if self.takes_block() && self.take_segment(frame, now) {
             return self.process_next();
         }
         self.take_service_frame(frame, now, out);
@@ -82,22 +91,29 @@ impl<B: Body> Node<B> {
         [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
     }
 
-    /// The CAN-ID of requests to the SDO server.
-    fn sdo_request(&self) -> CanId {
-        self.body.basic().service(SDO_REQUEST)
-    }
-
     /// Takes a frame if it is a segment of a block from which nothing follows. Without SDO, no transfer is under way.
-    #[inline(never)]
+    #[inline]
     fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
-        let request = frame.full(self.sdo_request());
+        let request = frame.full(self.services.sdo_request);
         request.is_some_and(|request| self.services.server.take_segment(request, now))
     }
 
+    /// Whether a block download is under way: the frame may be a segment.
+    #[inline]
+    pub(super) fn takes_block(&self) -> bool {
+        self.services.server.takes_block()
+    }
+
+    /// The same, for callers in which the code would stand a second time.
     #[inline(never)]
-    fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn take_segment_apart(&mut self, frame: &Frame, now: Instant) -> bool {
+        self.take_segment(frame, now)
+    }
+
+    #[inline(never)]
+    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         // A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-        if let Some(request) = frame.full(self.sdo_request()) {
+        if let Some(request) = frame.full(self.services.sdo_request) {
             if self.body.basic().state.has_services() {
                 self.on_request(request, &mut self.services.turn(now, out));
             }

@@ -40,11 +40,9 @@ impl Receiver {
     #[inline]
     pub(super) fn take_next(&mut self, frame: &[u8; 8], buffer: &mut [u8; BUFFER]) -> bool {
         let [sequence, data @ ..] = frame;
-        let is_taken =
-            *sequence == self.next && matches!(sequence, 2..=126) && self.sink.append_segment(data, buffer);
+        let is_taken = *sequence == self.next && self.sink.append_direct(data, buffer);
         if is_taken {
             self.next += 1;
-            self.newest = None;
         }
         is_taken
     }
@@ -57,11 +55,12 @@ impl Receiver {
         objects: &mut impl Objects,
     ) -> Result<bool, Abort> {
         self.has_begun = true;
-        if self.newest.replace(segment) == Some(segment) {
+        let is_next = segment.sequence.get() == self.next;
+        if self.newest.replace(segment) == Some(segment) && !is_next {
             return Ok(false);
         }
         let is_end = segment.last || segment.sequence == BlockSize::MAX;
-        if segment.sequence.get() == self.next {
+        if is_next {
             self.next += 1;
             if segment.last {
                 self.last = Some(segment.data);
@@ -71,6 +70,8 @@ impl Receiver {
         }
         if is_end {
             self.sink.hand_over(buffer, objects)?;
+        } else {
+            self.sink.take_direct(BlockSize::MAX.get().saturating_sub(self.next).into());
         }
         Ok(is_end)
     }

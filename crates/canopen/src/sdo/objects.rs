@@ -96,8 +96,10 @@ pub(super) struct Sink {
     crc: u16,
     /// Bytes in the buffer.
     held: usize,
-    /// The most bytes that may be there, by its size and by the limit.
-    brim: usize,
+    /// The most bytes that the buffer may hold, by its size and by the limit.
+    most_held: usize,
+    /// Whole segments are taken by `append_direct` up to this many bytes in the buffer; 0 for none.
+    direct: usize,
 }
 
 impl Sink {
@@ -120,7 +122,8 @@ impl Sink {
             }
         };
         let limit = announced.map_or(limit, |size| size.min(limit));
-        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, brim: limit.min(BUFFER) })
+        let most_held = limit.min(BUFFER);
+        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, most_held, direct: 0 })
     }
 
     /// Bytes that have come.
@@ -136,11 +139,11 @@ impl Sink {
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if self.held + bytes.len() > self.brim {
+        if self.held + bytes.len() > self.most_held {
             self.hand_over(buffer, objects)?;
         }
         let end = self.held + bytes.len();
-        if end > self.brim {
+        if end > self.most_held {
             return Err(Abort::TooLong);
         }
         copy(buffer.get_mut(self.held..end).ok_or(Abort::TooLong)?, bytes);
@@ -148,12 +151,20 @@ impl Sink {
         Ok(())
     }
 
-    /// Takes a whole segment if the buffer has room for it. With a length that the compiler knows, the copy is two words.
+    /// Lets `append_direct` take so many segments at most.
+    pub(super) fn take_direct(&mut self, segments: usize) {
+        self.direct = self.most_held.min(self.held + 7 * segments);
+    }
+
+    /// Takes a whole segment if the buffer has room for it and `take_direct` allows. With a length that the compiler knows, the copy is
+    /// two words.
     #[inline]
-    pub(super) fn append_segment(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
+    pub(super) fn append_direct(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
         let end = self.held + data.len();
-        let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
-        let Some(place) = place.filter(|_| end <= self.brim) else { return false };
+        if end > self.direct {
+            return false;
+        }
+        let Some(place) = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut()) else { return false };
         *place = *data;
         self.held = end;
         true
@@ -171,7 +182,8 @@ impl Sink {
         self.crc = self.crc(buffer);
         let part = Part::Data(self.gone, self.held(buffer));
         (self.gone, self.held) = (self.len(), 0);
-        self.brim = self.limit.saturating_sub(self.gone).min(BUFFER);
+        self.most_held = self.limit.saturating_sub(self.gone).min(BUFFER);
+        self.direct = 0;
         objects.stream(self.at, part)
     }
 
