@@ -13,9 +13,7 @@ impl<B: Body> Node<B> {
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
-        if !(self.takes_block() && self.take_segment_apart(frame, now)) {
-            self.take_service_frame(frame, now, out);
-        }
+        self.take_service_frame(frame, now, out);
         self.services_next()
     }
 

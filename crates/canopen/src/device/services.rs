@@ -4,6 +4,7 @@ use super::body::Body;
 use super::lss::Layer;
 use super::{Application as _, Next, Node, STALE};
 use crate::lss::{self, BitRate};
+use crate::frame::FullFrameId;
 use crate::sdo::{Abort, Server};
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
@@ -17,8 +18,8 @@ const ERROR_CONTROL: u16 = 0x700;
 #[derive(Debug)]
 pub(super) struct Services {
     server: Server,
-    /// The CAN-ID of requests to the server.
-    sdo_request: CanId,
+    /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is none.
+    sdo_request: FullFrameId,
     /// When to try again to send a reply of the server that found the queue full.
     reply_due: Instant,
     /// When to go on with a block that found the queue full.
@@ -61,15 +62,15 @@ impl Services {
 }
 
 /// The CAN-ID of requests to the SDO server; that of no device without a node-ID.
-fn sdo_request(node_id: Option<NodeId>) -> CanId {
-    CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get))
+fn sdo_request(node_id: Option<NodeId>) -> FullFrameId {
+    CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get)).into()
 }
 
 impl<B: Body> Node<B> {
     /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        if self.takes_block() && self.take_segment(frame, now) {
+        if self.services.server.takes_block() && self.take_segment(frame, now) {
             return self.process_next();
         }
         self.take_service_frame(frame, now, out);
@@ -98,21 +99,8 @@ impl<B: Body> Node<B> {
         request.is_some_and(|request| self.services.server.take_segment(request, now))
     }
 
-    /// Whether a block download is under way: the frame may be a segment.
-    #[inline]
-    pub(super) fn takes_block(&self) -> bool {
-        self.services.server.takes_block()
-    }
-
-    /// The same, for callers in which the code would stand a second time.
-    #[inline(never)]
-    pub(super) fn take_segment_apart(&mut self, frame: &Frame, now: Instant) -> bool {
-        self.take_segment(frame, now)
-    }
-
     #[inline(never)]
     pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        // A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
         if let Some(request) = frame.full(self.services.sdo_request) {
             if self.body.basic().state.has_services() {
                 self.on_request(request, &mut self.services.turn(now, out));

@@ -96,10 +96,8 @@ pub(super) struct Sink {
     crc: u16,
     /// Bytes in the buffer.
     held: usize,
-    /// The most bytes that the buffer may hold, by its size and by the limit.
-    most_held: usize,
     /// Whole segments are taken by `append_direct` up to this many bytes in the buffer; 0 for none.
-    direct: usize,
+    direct: u8,
 }
 
 impl Sink {
@@ -122,8 +120,7 @@ impl Sink {
             }
         };
         let limit = announced.map_or(limit, |size| size.min(limit));
-        let most_held = limit.min(BUFFER);
-        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, most_held, direct: 0 })
+        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, direct: 0 })
     }
 
     /// Bytes that have come.
@@ -139,21 +136,31 @@ impl Sink {
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if self.held + bytes.len() > self.most_held {
+        if self.held + bytes.len() > self.most_held() {
             self.hand_over(buffer, objects)?;
         }
         let end = self.held + bytes.len();
-        if end > self.most_held {
+        if end > self.most_held() {
             return Err(Abort::TooLong);
         }
-        copy(buffer.get_mut(self.held..end).ok_or(Abort::TooLong)?, bytes);
+        let place = buffer.get_mut(self.held..end).ok_or(Abort::TooLong)?;
+        // With a length that the compiler knows, the copy is two words.
+        match (place.first_chunk_mut::<7>(), bytes.first_chunk()) {
+            (Some(place), Some(segment)) => *place = *segment,
+            _ => copy(place, bytes),
+        }
         self.held = end;
         Ok(())
     }
 
     /// Lets `append_direct` take so many segments at most.
     pub(super) fn take_direct(&mut self, segments: usize) {
-        self.direct = self.most_held.min(self.held + 7 * segments);
+        self.direct = self.most_held().min(self.held + 7 * segments) as u8;
+    }
+
+    /// The most bytes that the buffer may hold, by its size and by the limit.
+    fn most_held(&self) -> usize {
+        self.limit.saturating_sub(self.gone).min(BUFFER)
     }
 
     /// Takes a whole segment if the buffer has room for it and `take_direct` allows. With a length that the compiler knows, the copy is
@@ -161,7 +168,7 @@ impl Sink {
     #[inline]
     pub(super) fn append_direct(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
         let end = self.held + data.len();
-        if end > self.direct {
+        if end > self.direct.into() {
             return false;
         }
         let Some(place) = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut()) else { return false };
@@ -182,7 +189,6 @@ impl Sink {
         self.crc = self.crc(buffer);
         let part = Part::Data(self.gone, self.held(buffer));
         (self.gone, self.held) = (self.len(), 0);
-        self.most_held = self.limit.saturating_sub(self.gone).min(BUFFER);
         self.direct = 0;
         objects.stream(self.at, part)
     }
