@@ -3,8 +3,8 @@
 use super::body::Body;
 use super::lss::Layer;
 use super::{Application as _, Next, Node, STALE};
-use crate::lss::{self, BitRate};
 use crate::frame::FullFrameId;
+use crate::lss::{self, BitRate};
 use crate::sdo::{Abort, Server};
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};

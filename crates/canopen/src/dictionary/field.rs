@@ -19,7 +19,8 @@ impl Field {
         image.get(start..start + usize::from(self.size)).unwrap_or(&[])
     }
 
-    /// Replaces the value, as `set`, by the bytes of which `value` are the first four.
+    /// Replaces the value, as `set` does, by bytes of which the caller has the first four as a number: a value of four bytes, the
+    /// usual one, needs no call.
     #[inline]
     pub(crate) fn set_number(self, image: &mut [u8], value: u32, bytes: &[u8]) {
         match self.size {

@@ -110,10 +110,13 @@ impl Server {
     // compared with the request before, and nothing to be remembered.
     #[inline]
     pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
-        match frame[0] >> 5 {
-            1 if !self.wants_block_segments() => self.initiate_download(frame, objects, now),
-            2 if !self.wants_block_segments() => self.initiate_upload(frame, objects, now),
-            _ => self.go_on(frame, objects, now),
+        let command = frame[0] >> 5;
+        if !matches!(command, 1 | 2) || self.wants_block_segments() {
+            self.go_on(frame, objects, now)
+        } else if command == 1 {
+            self.initiate_download(frame, objects, now)
+        } else {
+            self.initiate_upload(frame, objects, now)
         }
     }
 

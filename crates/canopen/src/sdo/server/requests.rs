@@ -29,7 +29,7 @@ impl Server {
             return Err(Abort::Command);
         };
         match request {
-            // They do not come here.
+            // `answer` hands these to functions of their own.
             Request::Upload(_) | Request::Download(..) => Err(Abort::Command),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
             Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
@@ -66,13 +66,18 @@ impl Server {
 
     /// The request that begins a download.
     #[inline(never)]
-    pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+    pub(super) fn initiate_download(
+        &mut self,
+        frame: &[u8; 8],
+        objects: &mut impl Objects,
+        now: Instant,
+    ) -> bool {
         let at = Multiplexer::parse(frame);
         self.begin(at);
+        // Most writes are of this kind: the data are taken straight from the frame.
         let result = match Initiate::expedited(frame) {
-            // Straight from the frame: most writes are of this kind.
             Some(data) => objects.write(at, data, now),
-            None => self.download(at, Initiate::parse(frame), objects, now),
+            None => self.download(at, frame, objects, now),
         };
         let answer = result.map(|()| self.say(Response::Downloaded(at)));
         self.conclude(answer, objects, now)
@@ -80,7 +85,12 @@ impl Server {
 
     /// The request that begins an upload.
     #[inline(never)]
-    pub(super) fn initiate_upload(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+    pub(super) fn initiate_upload(
+        &mut self,
+        frame: &[u8; 8],
+        objects: &mut impl Objects,
+        now: Instant,
+    ) -> bool {
         let answer = self.upload(Multiplexer::parse(frame), objects);
         self.settle(answer, now)
     }
@@ -116,11 +126,11 @@ impl Server {
     fn download(
         &mut self,
         at: Multiplexer,
-        initiate: Initiate,
+        frame: &[u8; 8],
         objects: &mut impl Objects,
         now: Instant,
     ) -> Result<(), Abort> {
-        match initiate {
+        match Initiate::parse(frame) {
             Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now),
             Initiate::Unsized(data) => {
                 let value = unsized_value(data, at, objects)?;
