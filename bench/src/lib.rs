@@ -33,13 +33,13 @@ pub trait Node {
     fn pass(&mut self, now: u64);
 
     /// A frame that may be for any node, up to the point where its receiver is known.
-    fn sort(&mut self, frame: Self::Frame, now: u64);
+    fn sort(&mut self, frame: &Self::Frame, now: u64);
 
     /// NMT, SYNC or RPDO, up to the next deadline.
-    fn process(&mut self, frame: Self::Frame, now: u64);
+    fn process(&mut self, frame: &Self::Frame, now: u64);
 
     /// Any other frame of this node, up to the next deadline.
-    fn serve(&mut self, frame: Self::Frame, now: u64);
+    fn serve(&mut self, frame: &Self::Frame, now: u64);
 
     /// The application reports a fault and changes values. Not measured: only part of the program's size.
     fn disturb(&mut self, now: u64);
@@ -49,7 +49,8 @@ pub trait Node {
 pub fn run<N: Node>(node: &mut N) -> ! {
     loop {
         let Request { command, now, frame } = registers::request();
-        let (node, frame) = black_box((&mut *node, N::Frame::from(frame)));
+        let frame = N::Frame::from(frame);
+        let (node, frame) = black_box((&mut *node, &frame));
         registers::count(true);
         match command {
             Command::Nothing => (),

@@ -124,11 +124,11 @@ impl Node for CanopenRs {
 
     fn pass(&mut self, _: u64) {}
 
-    fn sort(&mut self, frame: Received, now: u64) {
+    fn sort(&mut self, frame: &Received, now: u64) {
         self.serve(frame, now);
     }
 
-    fn process(&mut self, frame: Received, _: u64) {
+    fn process(&mut self, frame: &Received, _: u64) {
         if frame.0.id == SYNC {
             self.0.sync_tpdos().iter().for_each(send);
         } else {
@@ -136,7 +136,7 @@ impl Node for CanopenRs {
         }
     }
 
-    fn serve(&mut self, frame: Received, _: u64) {
+    fn serve(&mut self, frame: &Received, _: u64) {
         if let Some(answer) = self.0.on_frame(frame.0.id, frame.data()) {
             send(&answer);
         }

@@ -29,16 +29,16 @@ impl Node for Empty {
 
     fn pass(&mut self, _: u64) {}
 
-    fn sort(&mut self, frame: Raw, _: u64) {
-        self.echo(&frame);
+    fn sort(&mut self, frame: &Raw, _: u64) {
+        self.echo(frame);
     }
 
-    fn process(&mut self, frame: Raw, _: u64) {
-        self.echo(&frame);
+    fn process(&mut self, frame: &Raw, _: u64) {
+        self.echo(frame);
     }
 
-    fn serve(&mut self, frame: Raw, _: u64) {
-        self.echo(&frame);
+    fn serve(&mut self, frame: &Raw, _: u64) {
+        self.echo(frame);
     }
 
     fn disturb(&mut self, _: u64) {}

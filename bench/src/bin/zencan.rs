@@ -103,19 +103,19 @@ impl Node for Zencan {
         self.run(now);
     }
 
-    fn sort(&mut self, Message(message): Message, _: u64) {
-        let _ = generated::NODE_MBOX.store_message(message);
+    fn sort(&mut self, Message(message): &Message, _: u64) {
+        let _ = generated::NODE_MBOX.store_message(*message);
     }
 
     /// The mailbox does not request processing for an RPDO: the RPDO waits for the next pass, which is therefore
     /// counted too.
-    fn process(&mut self, Message(message): Message, now: u64) {
-        let _ = generated::NODE_MBOX.store_message(message);
+    fn process(&mut self, Message(message): &Message, now: u64) {
+        let _ = generated::NODE_MBOX.store_message(*message);
         self.run(now);
     }
 
-    fn serve(&mut self, Message(message): Message, now: u64) {
-        let _ = generated::NODE_MBOX.store_message(message);
+    fn serve(&mut self, Message(message): &Message, now: u64) {
+        let _ = generated::NODE_MBOX.store_message(*message);
         if PROCESS.load(Ordering::Relaxed) {
             PROCESS.store(false, Ordering::Relaxed);
             self.run(now);

@@ -38,8 +38,8 @@ impl Frame {
 
     /// All eight bytes, if this is a full data frame with this identifier.
     #[inline]
-    pub(crate) fn full(&self, id: CanId) -> Option<&[u8; 8]> {
-        (self.head == head(id.get(), 8)).then_some(&self.data)
+    pub(crate) fn full(&self, id: impl Into<FullFrameId>) -> Option<&[u8; 8]> {
+        (self.head == id.into().0).then_some(&self.data)
     }
 
     /// A remote frame; `None` for an identifier above 7FFh or a length above eight.
@@ -78,6 +78,16 @@ impl Frame {
     #[must_use]
     pub fn data(&self) -> &[u8] {
         if self.is_remote() { &[] } else { self.data.get(..self.len()).unwrap_or(&[]) }
+    }
+}
+
+/// The identifier of data frames of eight bytes, as it is in their heads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FullFrameId(u32);
+
+impl From<CanId> for FullFrameId {
+    fn from(id: CanId) -> FullFrameId {
+        FullFrameId(head(id.get(), 8))
     }
 }
 

@@ -101,17 +101,17 @@ impl Node for Ours {
         let _ = self.device.set_condition(0, false, Instant(now));
     }
 
-    fn sort(&mut self, Received(frame): Received, now: u64) {
-        let _ = self.device.on_frame(&frame, Instant(now), &mut self.driver);
+    fn sort(&mut self, Received(frame): &Received, now: u64) {
+        let _ = self.device.on_frame(frame, Instant(now), &mut self.driver);
     }
 
-    fn process(&mut self, Received(frame): Received, now: u64) {
-        let next = self.device.on_process_frame(&frame, Instant(now), &mut self.driver);
+    fn process(&mut self, Received(frame): &Received, now: u64) {
+        let next = self.device.on_process_frame(frame, Instant(now), &mut self.driver);
         self.alarms[0] = next.process;
     }
 
-    fn serve(&mut self, Received(frame): Received, now: u64) {
-        let next = self.device.on_service_frame(&frame, Instant(now), &mut self.driver);
+    fn serve(&mut self, Received(frame): &Received, now: u64) {
+        let next = self.device.on_service_frame(frame, Instant(now), &mut self.driver);
         self.alarms[1] = next.services;
     }
 }

@@ -47,7 +47,7 @@ impl<B: Body> Objects for B {
         let value = little_endian(bytes);
         entry.check_value(value)?;
         match entry.rule() {
-            Rule::Plain => entry.field.set(&mut self.basic_mut().image, bytes),
+            Rule::Plain => entry.field.set_number(&mut self.basic_mut().image, value, bytes),
             _ => write_by_rule(self, entry, value, bytes, now)?,
         }
         let basic = self.basic_mut();

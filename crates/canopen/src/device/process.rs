@@ -13,7 +13,8 @@ impl<B: Body> Node<B> {
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
-        self.on_service_frame(frame, now, out)
+        self.take_service_frame(frame, now, out);
+        self.services_next()
     }
 
     /// Sends what is due in both halves.

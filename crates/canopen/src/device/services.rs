@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::lss::Layer;
 use super::{Application as _, Next, Node, STALE};
+use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::sdo::{Abort, Server};
 use crate::transmit::{RETRY, Turn};
@@ -17,6 +18,8 @@ const ERROR_CONTROL: u16 = 0x700;
 #[derive(Debug)]
 pub(super) struct Services {
     server: Server,
+    /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is none.
+    sdo_request: FullFrameId,
     /// When to try again to send a reply of the server that found the queue full.
     reply_due: Instant,
     /// When to go on with a block that found the queue full.
@@ -28,6 +31,7 @@ impl Services {
     pub(super) fn new(node_id: Option<NodeId>) -> Services {
         Services {
             server: Server::new(),
+            sdo_request: sdo_request(node_id),
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: Layer::new(node_id),
@@ -42,6 +46,7 @@ impl Services {
     pub(super) fn restart(&mut self) -> Option<NodeId> {
         self.forget_transfer();
         self.lss.restart();
+        self.sdo_request = sdo_request(self.lss.node_id());
         self.lss.node_id()
     }
 
@@ -54,6 +59,11 @@ impl Services {
     pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
         Turn { now, out, is_open: !self.lss.is_switching() }
     }
+}
+
+/// The CAN-ID of requests to the SDO server; that of no device without a node-ID.
+fn sdo_request(node_id: Option<NodeId>) -> FullFrameId {
+    CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get)).into()
 }
 
 impl<B: Body> Node<B> {
@@ -82,22 +92,16 @@ impl<B: Body> Node<B> {
         [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
     }
 
-    /// The CAN-ID of requests to the SDO server.
-    fn sdo_request(&self) -> CanId {
-        self.body.basic().service(SDO_REQUEST)
-    }
-
     /// Takes a frame if it is a segment of a block from which nothing follows. Without SDO, no transfer is under way.
-    #[inline(never)]
+    #[inline]
     fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
-        let request = frame.full(self.sdo_request());
+        let request = frame.full(self.services.sdo_request);
         request.is_some_and(|request| self.services.server.take_segment(request, now))
     }
 
     #[inline(never)]
-    fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        // A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-        if let Some(request) = frame.full(self.sdo_request()) {
+    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if let Some(request) = frame.full(self.services.sdo_request) {
             if self.body.basic().state.has_services() {
                 self.on_request(request, &mut self.services.turn(now, out));
             }

@@ -14,6 +14,8 @@ pub(super) struct Receiver {
     /// The segment that came last, in sequence or not, if it may be the one that comes next. One that comes twice in a
     /// row counts once.
     newest: Option<BlockSegment>,
+    /// What `next` was after the newest segment: where `next` has gone on, other segments have come since.
+    next_then: u8,
     /// Something of this block has come.
     has_begun: bool,
     /// The last segment of all. How much of it is data, only the end says; nothing else is missing.
@@ -22,7 +24,7 @@ pub(super) struct Receiver {
 
 impl Receiver {
     pub(super) fn new(sink: Sink, check_crc: bool) -> Receiver {
-        Receiver { sink, check_crc, next: 1, newest: None, has_begun: false, last: None }
+        Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None }
     }
 
     /// Whether frames are segments now, and not requests.
@@ -36,15 +38,13 @@ impl Receiver {
     }
 
     /// Takes a frame that is the next segment of a block, neither the first nor the last, if the buffer has room for a whole
-    /// one: most frames of a transfer are nothing else. Only within a block is anything but 1 the next. Whether it was taken.
+    /// one: most frames of a transfer are nothing else. Whether the frame was taken.
     #[inline]
     pub(super) fn take_next(&mut self, frame: &[u8; 8], buffer: &mut [u8; BUFFER]) -> bool {
         let [sequence, data @ ..] = frame;
-        let is_taken =
-            *sequence == self.next && matches!(sequence, 2..=126) && self.sink.append_segment(data, buffer);
+        let is_taken = *sequence == self.next && self.sink.append_direct(data, buffer);
         if is_taken {
             self.next += 1;
-            self.newest = None;
         }
         is_taken
     }
@@ -57,7 +57,8 @@ impl Receiver {
         objects: &mut impl Objects,
     ) -> Result<bool, Abort> {
         self.has_begun = true;
-        if self.newest.replace(segment) == Some(segment) {
+        let is_in_a_row = self.next_then == self.next;
+        if self.newest.replace(segment) == Some(segment) && is_in_a_row {
             return Ok(false);
         }
         let is_end = segment.last || segment.sequence == BlockSize::MAX;
@@ -71,13 +72,19 @@ impl Receiver {
         }
         if is_end {
             self.sink.hand_over(buffer, objects)?;
+        } else {
+            // Neither the first segment of a block, which comes here, nor the last one.
+            self.sink.allow_direct(BlockSize::MAX.get().saturating_sub(self.next).into());
         }
+        self.next_then = self.next;
         Ok(is_end)
     }
 
     /// The sequence number to acknowledge; the next block begins.
     pub(super) fn acknowledge(&mut self) -> u8 {
         self.has_begun = false;
+        self.next_then = 1;
+        self.sink.allow_direct(0);
         core::mem::replace(&mut self.next, 1) - 1
     }
 

@@ -82,6 +82,12 @@ impl Source {
     }
 }
 
+/// A length that is no longer than the buffer.
+#[allow(clippy::cast_possible_truncation)] // The buffer has 112 bytes.
+const fn in_buffer(len: usize) -> u8 {
+    len as u8
+}
+
 /// Where a download goes: into the buffer, from where a value is written when it is complete, and a stream goes on
 /// whenever the buffer is full.
 #[derive(Clone, Copy, Debug)]
@@ -95,9 +101,9 @@ pub(super) struct Sink {
     gone: usize,
     crc: u16,
     /// Bytes in the buffer.
-    held: usize,
-    /// The most bytes that may be there, by its size and by the limit.
-    brim: usize,
+    held: u8,
+    /// Up to this many bytes in the buffer, `append_direct` takes whole segments.
+    direct: u8,
 }
 
 impl Sink {
@@ -120,12 +126,12 @@ impl Sink {
             }
         };
         let limit = announced.map_or(limit, |size| size.min(limit));
-        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, brim: limit.min(BUFFER) })
+        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, direct: 0 })
     }
 
     /// Bytes that have come.
     fn len(&self) -> usize {
-        self.gone.saturating_add(self.held)
+        self.gone.saturating_add(self.held.into())
     }
 
     /// Takes up to seven bytes.
@@ -136,26 +142,45 @@ impl Sink {
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if self.held + bytes.len() > self.brim {
+        if usize::from(self.held) + bytes.len() > self.most_held() {
             self.hand_over(buffer, objects)?;
         }
-        let end = self.held + bytes.len();
-        if end > self.brim {
+        let end = usize::from(self.held) + bytes.len();
+        if end > self.most_held() {
             return Err(Abort::TooLong);
         }
-        copy(buffer.get_mut(self.held..end).ok_or(Abort::TooLong)?, bytes);
-        self.held = end;
+        let place = buffer.get_mut(usize::from(self.held)..end).ok_or(Abort::TooLong)?;
+        // With a length that the compiler knows, the copy is two words.
+        match (place.first_chunk_mut::<7>(), bytes.first_chunk()) {
+            (Some(place), Some(segment)) => *place = *segment,
+            _ => copy(place, bytes),
+        }
+        self.held = in_buffer(end);
         Ok(())
     }
 
-    /// Takes a whole segment if the buffer has room for it. With a length that the compiler knows, the copy is two words.
+    /// Lets `append_direct` take at most this many segments, and no more than the buffer has room for.
+    pub(super) fn allow_direct(&mut self, segments: usize) {
+        self.direct = in_buffer(self.most_held().min(usize::from(self.held) + 7 * segments));
+    }
+
+    /// The most bytes that the buffer may hold, by its size and by the limit.
+    fn most_held(&self) -> usize {
+        self.limit.saturating_sub(self.gone).min(BUFFER)
+    }
+
+    /// Takes a whole segment if `allow_direct` has left room for it. With a length that the compiler knows, the copy is two words.
     #[inline]
-    pub(super) fn append_segment(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
-        let end = self.held + data.len();
-        let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
-        let Some(place) = place.filter(|_| end <= self.brim) else { return false };
+    pub(super) fn append_direct(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
+        let start = usize::from(self.held);
+        if start + data.len() > self.direct.into() {
+            return false;
+        }
+        let Some(place) = buffer.get_mut(start..).and_then(|rest| rest.first_chunk_mut()) else {
+            return false;
+        };
         *place = *data;
-        self.held = end;
+        self.held = in_buffer(start + data.len());
         true
     }
 
@@ -171,12 +196,11 @@ impl Sink {
         self.crc = self.crc(buffer);
         let part = Part::Data(self.gone, self.held(buffer));
         (self.gone, self.held) = (self.len(), 0);
-        self.brim = self.limit.saturating_sub(self.gone).min(BUFFER);
         objects.stream(self.at, part)
     }
 
     fn held<'a>(&self, buffer: &'a [u8; BUFFER]) -> &'a [u8] {
-        buffer.get(..self.held).unwrap_or(&[])
+        buffer.get(..self.held.into()).unwrap_or(&[])
     }
 
     /// CRC of all that has come.

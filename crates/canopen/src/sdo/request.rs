@@ -124,10 +124,17 @@ impl Request {
 }
 
 impl Initiate {
-    fn parse(frame: &[u8; 8]) -> Initiate {
-        let (data, unused) = (tail(frame), frame[0] >> 2 & 3);
+    /// The data in the frame, where they are all of the data and their size is given.
+    pub(super) fn expedited(frame: &[u8; 8]) -> Option<&[u8]> {
+        let [command, _, _, _, data @ ..] = frame;
+        let unused = usize::from(command >> 2 & 3);
+        if command & 0x03 == 0b11 { data.get(..data.len() - unused) } else { None }
+    }
+
+    pub(super) fn parse(frame: &[u8; 8]) -> Initiate {
+        let data = tail(frame);
         match frame[0] & 0x03 {
-            0b11 => Initiate::Expedited(Bytes::new(data, 4 - unused)),
+            0b11 => Initiate::Expedited(Bytes::from_slice(Initiate::expedited(frame).unwrap_or(&data))),
             0b10 => Initiate::Unsized(data),
             0b01 => Initiate::Segmented(Some(u32::from_le_bytes(data))),
             _ => Initiate::Segmented(None),

@@ -106,23 +106,33 @@ impl Server {
     }
 
     /// Takes a request; whether there is a reply.
-    #[inline(never)]
+    // The requests that begin a download or an upload are the most frequent ones. They belong to no series: nothing is to be
+    // compared with the request before, and nothing to be remembered.
+    #[inline]
     pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
-        // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
-        let is_of_series = !matches!(frame[0] >> 5, 1 | 2) || self.wants_block_segments();
-        let is_repeated = is_of_series && *frame == self.previous;
+        let command = frame[0] >> 5;
+        if !matches!(command, 1 | 2) || self.wants_block_segments() {
+            self.go_on(frame, objects, now)
+        } else if command == 1 {
+            self.initiate_download(frame, objects, now)
+        } else {
+            self.initiate_upload(frame, objects, now)
+        }
+    }
+
+    /// A request of a series: it may be the same as the one before.
+    #[inline(never)]
+    fn go_on(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+        let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
         }
-        let segment = if is_of_series { self.block_segment(frame, is_repeated) } else { None };
-        let answer = match segment {
+        let answer = match self.block_segment(frame, is_repeated) {
             Some(segment) => self.take_block_segment(segment, objects),
             None => self.dispatch(frame, is_repeated, objects, now),
         };
         let has_reply = self.conclude(answer, objects, now);
-        if is_of_series {
-            (self.previous, self.is_answered) = (*frame, has_reply);
-        }
+        (self.previous, self.is_answered) = (*frame, has_reply);
         has_reply
     }
 
@@ -190,12 +200,14 @@ impl Server {
     }
 
     /// An error ends the transfer.
+    #[inline]
     fn settle(&mut self, answer: Answer, now: Instant) -> bool {
         self.active = now;
         answer.unwrap_or_else(|abort| self.give_up(abort))
     }
 
     /// Ends the transfer: the one place where an error becomes an abort message.
+    #[inline(never)]
     fn give_up(&mut self, abort: Abort) -> bool {
         self.transfer = Transfer::Idle;
         self.is_answered = false;

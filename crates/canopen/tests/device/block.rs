@@ -305,6 +305,39 @@ fn a_block_leaves_room_in_the_queue() {
     assert_eq!(client.block().len(), 100);
 }
 
+/// A client that falls silent within a block is told what has come, also in a later block of which only the first segment comes.
+#[test]
+fn a_pause_within_any_block_is_answered() {
+    for (at, size, blocks) in [(DOMAIN, 70, [(0, 3), (3, 1), (4, 1)]), (TEXT, 20, [(0, 0), (0, 1), (1, 1)])] {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at, crc: true, size: Some(size) });
+        for (begin, segments) in blocks.into_iter().filter(|(_, segments)| *segments > 0) {
+            for sequence in 1..=segments {
+                let number = begin + usize::from(sequence) - 1;
+                assert_eq!(client.send_segment(segment(&data(70), number, sequence)), None);
+            }
+            assert_eq!(client.wait(), Some(Response::BlockAcknowledge(segments, BlockSize::MAX)));
+        }
+    }
+}
+
+/// What comes twice in a row counts once; what comes again later is what was missing.
+#[test]
+fn a_segment_that_came_too_early_is_taken_when_its_turn_has_come() {
+    let mut client = Client::new();
+    let content = data(35);
+    client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(35) });
+    // The third segment overtakes the second one. Then the third one comes again, in its place.
+    for number in [0, 2, 1, 2, 3] {
+        assert_eq!(client.send_segment(segment(&content, number, number as u8 + 1)), None);
+    }
+    let last = segment(&content, 4, 5);
+    assert_eq!(client.send_segment(last), Some(Response::BlockAcknowledge(5, BlockSize::MAX)));
+    assert_eq!(client.send_segment(last), None);
+    assert_eq!(client.bench.ask(Request::BlockDownloadEnd(end(&content))), Some(Response::BlockDownloaded));
+    assert_eq!(client.bench.device.application().domain, content);
+}
+
 #[test]
 fn the_begin_of_a_download_that_comes_twice_is_no_segment() {
     let mut client = Client::new();

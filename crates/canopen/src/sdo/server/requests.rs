@@ -29,8 +29,8 @@ impl Server {
             return Err(Abort::Command);
         };
         match request {
-            Request::Upload(at) => self.upload(at, objects),
-            Request::Download(at, initiate) => self.download(at, initiate, objects, now),
+            // `answer` hands these to functions of their own.
+            Request::Upload(_) | Request::Download(..) => Err(Abort::Command),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
             Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
             Request::Abort(..) => {
@@ -64,6 +64,37 @@ impl Server {
         }
     }
 
+    /// The request that begins a download.
+    #[inline(never)]
+    pub(super) fn initiate_download(
+        &mut self,
+        frame: &[u8; 8],
+        objects: &mut impl Objects,
+        now: Instant,
+    ) -> bool {
+        let at = Multiplexer::parse(frame);
+        self.begin(at);
+        // Most writes are of this kind: the data are taken straight from the frame.
+        let result = match Initiate::expedited(frame) {
+            Some(data) => objects.write(at, data, now),
+            None => self.download(at, frame, objects, now),
+        };
+        let answer = result.map(|()| self.say(Response::Downloaded(at)));
+        self.conclude(answer, objects, now)
+    }
+
+    /// The request that begins an upload.
+    #[inline(never)]
+    pub(super) fn initiate_upload(
+        &mut self,
+        frame: &[u8; 8],
+        objects: &mut impl Objects,
+        now: Instant,
+    ) -> bool {
+        let answer = self.upload(Multiplexer::parse(frame), objects);
+        self.settle(answer, now)
+    }
+
     /// A new transfer; one that was under way is forgotten, as its client has started over.
     fn begin(&mut self, at: Multiplexer) {
         self.transfer = Transfer::Idle;
@@ -91,25 +122,25 @@ impl Server {
         Ok(self.say(Response::UploadedSegment(segment)))
     }
 
+    #[inline(never)]
     fn download(
         &mut self,
         at: Multiplexer,
-        initiate: Initiate,
+        frame: &[u8; 8],
         objects: &mut impl Objects,
         now: Instant,
-    ) -> Answer {
-        self.begin(at);
-        match initiate {
-            Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now)?,
+    ) -> Result<(), Abort> {
+        match Initiate::parse(frame) {
+            Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now),
             Initiate::Unsized(data) => {
                 let value = unsized_value(data, at, objects)?;
-                objects.write(at, value.as_slice(), now)?;
+                objects.write(at, value.as_slice(), now)
             }
             Initiate::Segmented(size) => {
                 self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
+                Ok(())
             }
         }
-        Ok(self.say(Response::Downloaded(at)))
     }
 
     fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
