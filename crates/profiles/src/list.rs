@@ -362,6 +362,22 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::synchronised`]($crate::profile::Profile::synchronised).
+            pub fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]) {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.synchronised(counter, image),)+
+                }
+            }
+
+            /// As [`Profile::error`]($crate::profile::Profile::error).
+            pub fn error(&mut self, class: canopen::ErrorClass, image: &mut [u8]) {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.error(class, image),)+
+                }
+            }
+
             /// As [`Profile::show_flags`]($crate::profile::Profile::show_flags).
             pub fn show_flags(&self, flags: $crate::fault::Flags, image: &mut [u8]) {
                 use $crate::profile::Profile;

@@ -6,6 +6,7 @@
 //!                     ◀───── Parameters ─────────────
 //! ```
 
+use canopen::ErrorClass;
 use canopen::dictionary::Entry;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
@@ -81,6 +82,14 @@ pub trait Profile: Sized {
 
     /// The NMT state is another one now.
     fn state(&mut self, _state: State, _image: &mut [u8]) {}
+
+    /// A SYNC has come in the state Operational, with its counter where 1019h asks for one. What synchronous RPDOs have
+    /// brought is in the image; what synchronous TPDOs carry is read from the image afterwards.
+    fn synchronised(&mut self, _counter: Option<u8>, _image: &mut [u8]) {}
+
+    /// An error of this class has happened, such as a missing heartbeat or bus-off; the NMT state then changes as 1029h
+    /// says.
+    fn error(&mut self, _class: ErrorClass, _image: &mut [u8]) {}
 
     /// Calls `each` with every fault that the profile can find, always in the same order, and whether the values show it.
     fn faults(_snapshot: &Snapshot<Self>, _each: &mut impl FnMut(&'static Fault, bool)) {}
