@@ -4,7 +4,7 @@
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use profiles::board::{LASTING_WORDS, RETAINED_WORDS};
 use profiles::encoder::Lasting;
-use storage::{Change, DeviceRecord, Error, Group, Loaded, Store, View};
+use storage::{Change, DeviceRecord, Error, Loaded, Store, View};
 
 /// The bytes of a device record.
 type Device = [u8; DeviceRecord::LEN];
@@ -35,7 +35,7 @@ impl LastingRecord {
     /// The stored value; `None` where nothing is stored, or nothing that can be read.
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; LASTING_WORDS]> {
         let mut value: Value = [0; DeviceRecord::ROOM];
-        let loaded = view.load(Group::Device, &mut value);
+        let loaded = view.load(DeviceRecord::NUMBER, &mut value);
         let tail = tail(loaded, &value)?.as_chunks::<4>().0;
         let words: &[[u8; 4]; LASTING_WORDS] = tail.try_into().ok()?;
         Some(words.map(u32::from_le_bytes))
@@ -73,7 +73,7 @@ pub(crate) fn replace_device<F: NorFlash>(
     store: &mut Store<F>,
 ) -> Result<(), Error<F::Error>> {
     let mut value: Value = [0; DeviceRecord::ROOM];
-    let loaded = store.load(Group::Device, &mut value);
+    let loaded = store.load(DeviceRecord::NUMBER, &mut value);
     save(device, tail(loaded, &value).unwrap_or_default(), store)
 }
 
@@ -88,7 +88,7 @@ fn save<F: NorFlash>(device: Device, tail: &[u8], store: &mut Store<F>) -> Resul
     let mut value: Value = [0; DeviceRecord::ROOM];
     value.iter_mut().zip(device.iter().chain(tail)).for_each(|(to, from)| *to = *from);
     let value = value.get(..DeviceRecord::LEN + tail.len()).unwrap_or(&value);
-    store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value }])
+    store.save(&[Change::Set { group: DeviceRecord::NUMBER, version: DeviceRecord::VERSION, value }])
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use canopen::dictionary::Group;
 use heapless::{Vec, VecView};
+use storage::Number;
 
 const COMMUNICATION: usize = profiles::packed_size(Group::Communication);
 const APPLICATION: usize = profiles::packed_size(Group::Application);
@@ -61,11 +62,23 @@ impl PackedGroups {
     }
 }
 
-/// Under which name the parameter store holds a group.
-pub(crate) const fn record_of(group: Group) -> storage::Group {
+/// Under which number the parameter store holds a group. One is the device record.
+pub(crate) const fn number_of(group: Group) -> Number {
     match group {
-        Group::Communication => storage::Group::Communication,
-        Group::Application => storage::Group::Application,
-        Group::Calibration => storage::Group::Calibration,
+        Group::Communication => Number::Two,
+        Group::Application => Number::Three,
+        Group::Calibration => Number::Four,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_group_has_a_number_of_its_own() {
+        let [first, second, third] = Group::ALL.map(number_of);
+        assert!(first != second && second != third && first != third);
+        assert!(Group::ALL.iter().all(|group| number_of(*group) != storage::DeviceRecord::NUMBER));
     }
 }

@@ -1,4 +1,6 @@
-//! The value of [`Group::Device`](crate::Group::Device): what a node must know before it can go on the bus.
+//! The value of the group [`DeviceRecord::NUMBER`]: what a node must know before it can go on the bus.
+
+use crate::group::Number;
 
 /// Node-ID, bit rate and personality. A value of this type is always valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +11,8 @@ pub struct DeviceRecord {
 }
 
 impl DeviceRecord {
+    /// The group that holds the record.
+    pub const NUMBER: Number = Number::One;
     /// Layout version under which the record is stored.
     pub const VERSION: u16 = 1;
     /// Length of the stored record in bytes.

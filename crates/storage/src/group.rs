@@ -1,39 +1,34 @@
 //! The parameter groups and what is said of each.
 
-/// A set of parameters that is saved, restored and loaded as one.
+/// The number of a group in flash. What a group holds is the business of the caller, but for [`DeviceRecord::NUMBER`]. A
+/// number is never used again for another purpose.
+///
+/// [`DeviceRecord::NUMBER`]: crate::DeviceRecord::NUMBER
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
-    /// Node-ID, bit rate and personality: what LSS (CiA 305) and the factory set. See [`crate::DeviceRecord`].
-    Device,
-    /// Communication parameters, 1000h to 1FFFh (1010h sub-index 2).
-    Communication,
-    /// Application parameters, 6000h to 9FFFh and the user storage 4000h (1010h sub-index 3).
-    Application,
-    /// Calibration of the measuring channels: set in production, not touched by 1011h.
-    Calibration,
+#[repr(u8)]
+#[allow(missing_docs)] // A number says nothing but itself.
+pub enum Number {
+    One = 1,
+    Two,
+    Three,
+    Four,
 }
 
-impl Group {
-    /// Every group, in the order in which a transaction holds them.
-    pub const ALL: [Group; 4] = [Group::Device, Group::Communication, Group::Application, Group::Calibration];
+impl Number {
+    /// All of them, in the order in which a transaction holds their groups.
+    pub const ALL: [Number; 4] = [Number::One, Number::Two, Number::Three, Number::Four];
 
-    /// The number that stands for the group in flash. Numbers are never used again for another purpose.
+    /// As it stands in flash.
     pub(crate) const fn id(self) -> u8 {
-        match self {
-            Group::Device => 1,
-            Group::Communication => 2,
-            Group::Application => 3,
-            Group::Calibration => 4,
-        }
+        self as u8
     }
 
-    pub(crate) fn from_id(id: u8) -> Option<Group> {
-        Group::ALL.into_iter().find(|group| group.id() == id)
+    pub(crate) fn from_id(id: u8) -> Option<Number> {
+        Number::ALL.into_iter().find(|number| number.id() == id)
     }
 }
 
-/// Whether the newest values of a group could be read, as found when the store was opened. Anything but
-/// `Good` is worth an EMCY: 6301h for the device, 6302h for the communication and 6303h for the application group.
+/// Whether the newest values of a group could be read, as found when the store was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Health {
     /// The newest saved value is read; a save that a power cut kept from completing counts as not made.
@@ -51,20 +46,20 @@ pub enum Change<'a> {
     /// The group takes this value.
     Set {
         /// The group.
-        group: Group,
+        group: Number,
         /// Version of the value's layout; `load` hands it back so that the caller can migrate or refuse old data.
         version: u16,
         /// The value, at most [`crate::MAX_VALUE`] bytes. Empty is a value too.
         value: &'a [u8],
     },
-    /// The group has no stored value any more: the caller's defaults hold (1011h).
-    Restore(Group),
+    /// The group has no stored value any more: the caller's defaults hold.
+    Restore(Number),
 }
 
 impl Change<'_> {
     /// The group that changes.
     #[must_use]
-    pub fn group(&self) -> Group {
+    pub fn group(&self) -> Number {
         match *self {
             Change::Set { group, .. } | Change::Restore(group) => group,
         }
@@ -88,11 +83,11 @@ impl GroupSet {
     pub(crate) const NONE: GroupSet = GroupSet(0);
     pub(crate) const ALL: GroupSet = GroupSet(0xF);
 
-    pub(crate) fn contains(self, group: Group) -> bool {
+    pub(crate) fn contains(self, group: Number) -> bool {
         self.0 & GroupSet::bit(group) != 0
     }
 
-    pub(crate) fn insert(&mut self, group: Group) {
+    pub(crate) fn insert(&mut self, group: Number) {
         self.0 |= GroupSet::bit(group);
     }
 
@@ -101,7 +96,7 @@ impl GroupSet {
         GroupSet(self.0 & !other.0)
     }
 
-    fn bit(group: Group) -> u8 {
+    fn bit(group: Number) -> u8 {
         1 << (group.id() - 1)
     }
 }
@@ -111,35 +106,35 @@ impl GroupSet {
 pub(crate) struct PerGroup<T>([T; 4]);
 
 impl<T> PerGroup<T> {
-    pub(crate) fn from_fn(mut make: impl FnMut(Group) -> T) -> PerGroup<T> {
-        PerGroup(Group::ALL.map(&mut make))
+    pub(crate) fn from_fn(mut make: impl FnMut(Number) -> T) -> PerGroup<T> {
+        PerGroup(Number::ALL.map(&mut make))
     }
 
-    pub(crate) fn get(&self, group: Group) -> &T {
-        let [device, communication, application, calibration] = &self.0;
+    pub(crate) fn get(&self, group: Number) -> &T {
+        let [one, two, three, four] = &self.0;
         match group {
-            Group::Device => device,
-            Group::Communication => communication,
-            Group::Application => application,
-            Group::Calibration => calibration,
+            Number::One => one,
+            Number::Two => two,
+            Number::Three => three,
+            Number::Four => four,
         }
     }
 
-    pub(crate) fn get_mut(&mut self, group: Group) -> &mut T {
-        let [device, communication, application, calibration] = &mut self.0;
+    pub(crate) fn get_mut(&mut self, group: Number) -> &mut T {
+        let [one, two, three, four] = &mut self.0;
         match group {
-            Group::Device => device,
-            Group::Communication => communication,
-            Group::Application => application,
-            Group::Calibration => calibration,
+            Number::One => one,
+            Number::Two => two,
+            Number::Three => three,
+            Number::Four => four,
         }
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (Group, &T)> {
-        Group::ALL.into_iter().zip(&self.0)
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (Number, &T)> {
+        Number::ALL.into_iter().zip(&self.0)
     }
 
-    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Group, &mut T)> {
-        Group::ALL.into_iter().zip(&mut self.0)
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Number, &mut T)> {
+        Number::ALL.into_iter().zip(&mut self.0)
     }
 }

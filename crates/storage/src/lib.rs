@@ -1,23 +1,23 @@
 //! Parameter groups in two pages of NOR flash, safe against a power cut at any moment.
 //!
-//! A [`Group`] is a string of bytes with a layout version; what is in it is the caller's business. One [`Store::save`]
+//! A group is a string of bytes with a layout version and a [`Number`]; what is in it is the caller's business. One [`Store::save`]
 //! changes any number of groups at once: after a power cut at any flash operation all of them are old or all are new.
-//! Going back to the defaults (1011h) is such a change too. Data of an older layout is handed back with its version, to
+//! Going back to the defaults is such a change too. Data of an older layout is handed back with its version, to
 //! be migrated or refused as a whole by the caller.
 //!
 //! ```
-//! use storage::{Change, Group, Memory, Pages, Store, View};
+//! use storage::{Change, Memory, Number, Pages, Store, View};
 //!
 //! let pages = Pages::new(0, 16 * 1024);
 //! let flash = Memory(vec![0xFF; 32 * 1024]);
 //! let mut store = Store::prepare(View::open(flash, pages)?)?; // start-up: may erase
 //! let value = &[1, 2, 3];
 //! store.save(&[
-//!     Change::Set { group: Group::Application, version: 1, value },
-//!     Change::Restore(Group::Communication),
+//!     Change::Set { group: Number::Three, version: 1, value },
+//!     Change::Restore(Number::Two),
 //! ])?; // only programs words
 //! let mut buf = [0; 16];
-//! let loaded = store.load(Group::Application, &mut buf)?.expect("it was saved");
+//! let loaded = store.load(Number::Three, &mut buf)?.expect("it was saved");
 //! assert_eq!((loaded.version, &buf[..loaded.len]), (1, &value[..]));
 //! # Ok::<(), storage::Error<embedded_storage::nor_flash::NorFlashErrorKind>>(())
 //! ```
@@ -120,7 +120,7 @@ mod writer;
 
 pub use device::DeviceRecord;
 pub use error::Error;
-pub use group::{Change, Group, Health, Loaded};
+pub use group::{Change, Health, Loaded, Number};
 pub use lookup::device_record;
 pub use memory::Memory;
 pub use page::Pages;

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, ERASED, Format, KIND_RESTORED, KIND_VALUE, MARK, WORD, in_words};
-use crate::group::{Group, GroupSet};
+use crate::group::{GroupSet, Number};
 
 /// Where the two pages of the store lie in the flash. Both are of the same size and adjacent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ pub(crate) struct Transaction {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredRecord {
     /// `None` for a group that this version does not know.
-    pub(crate) group: Option<Group>,
+    pub(crate) group: Option<Number>,
     pub(crate) kind: u8,
     pub(crate) version: u16,
     pub(crate) generation: u16,
@@ -88,7 +88,7 @@ pub(crate) struct StoredRecord {
 
 impl StoredRecord {
     /// Whether it gives the group a value of some bytes.
-    pub(crate) fn is_value_of(&self, group: Group) -> bool {
+    pub(crate) fn is_value_of(&self, group: Number) -> bool {
         self.group == Some(group) && self.kind == KIND_VALUE && self.len > 0
     }
 }
@@ -162,7 +162,7 @@ impl Page {
         }
         let (version, generation) =
             (u16::from_le_bytes([low, high]), u16::from_le_bytes([generation_low, generation_high]));
-        Ok(Some(StoredRecord { group: Group::from_id(id), kind, version, generation, data, len, end }))
+        Ok(Some(StoredRecord { group: Number::from_id(id), kind, version, generation, data, len, end }))
     }
 
     /// The check word over the words between two places, of what begins at `at`.

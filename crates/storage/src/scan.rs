@@ -239,7 +239,7 @@ mod tests {
 
     use super::*;
     use crate::format::{Check, Contents, ERASED, Format, WORD};
-    use crate::group::Group;
+    use crate::group::Number;
     use crate::memory::Memory;
 
     const FORMAT: Format = Format::new(WORD).unwrap();
@@ -264,7 +264,7 @@ mod tests {
         Scan::of(&mut Memory(bytes.as_slice()), Page { start: 0, size: 64, format: FORMAT }).unwrap()
     }
 
-    fn head(group: Group) -> u32 {
+    fn head(group: Number) -> u32 {
         u32::from_le_bytes([group.id(), KIND_VALUE, 9, 0])
     }
 
@@ -272,8 +272,8 @@ mod tests {
     fn a_record_ends_where_its_transaction_ends_at_the_latest() {
         // Five to eight bytes have their check word where the test puts it.
         for (len, fits) in [(5, true), (8, true), (9, false), (0xFFFF, false)] {
-            let scan = scan(&[head(Group::Device), len, 0x1111, 0x2222]);
-            let content = scan.groups.get(Group::Device).content;
+            let scan = scan(&[head(Number::One), len, 0x1111, 0x2222]);
+            let content = scan.groups.get(Number::One).content;
             assert_eq!(matches!(content, Content::Value(slot) if slot.len == len), fits, "{len} bytes");
             assert!(scan.tidy);
         }

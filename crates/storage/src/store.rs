@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::NorFlash;
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::{CLEAN, Format, MARK};
-use crate::group::{Change, Group, Health, Loaded, PerGroup};
+use crate::group::{Change, Health, Loaded, Number, PerGroup};
 use crate::page::Page;
 #[cfg(doc)]
 use crate::page::Pages;
@@ -91,7 +91,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Values that are stored already are not written again: a master that saves after every start costs no flash.
     fn drop_unchanged(&mut self, records: &mut Records<'_>) -> Result<(), F::Error> {
-        for group in Group::ALL {
+        for group in Number::ALL {
             let is_same = match (records.get(group), self.current_content(group)) {
                 (Some(Record::Set { version, value }), Content::Value(slot)) if slot.version == *version => {
                     self.view.holds(&slot, value)?
@@ -107,7 +107,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// The value of the group that the next start would read. Nothing of a damaged page counts: the page is written anew.
-    fn current_content(&self, group: Group) -> Content {
+    fn current_content(&self, group: Number) -> Content {
         let entry = self.view.state.groups.get(group);
         if entry.suspect { Content::Unnamed } else { entry.content }
     }
@@ -116,7 +116,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Errors of [`View::load`].
-    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    pub fn load(&mut self, group: Number, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         self.view.load(group, buf)
     }
 
@@ -130,7 +130,7 @@ impl<F: NorFlash> Store<F> {
 
     /// The [`View::health`] that the view found, also after `prepare` has mended the store.
     #[must_use]
-    pub fn health(&self, group: Group) -> Health {
+    pub fn health(&self, group: Number) -> Health {
         self.view.health(group)
     }
 
@@ -226,6 +226,6 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
-fn last_change<'a>(changes: &[Change<'a>], group: Group) -> Option<Record<'a>> {
+fn last_change<'a>(changes: &[Change<'a>], group: Number) -> Option<Record<'a>> {
     changes.iter().rev().find(|change| change.group() == group).map(|&change| Record::from(change))
 }

@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::WORD;
-use crate::group::{Group, Health, Loaded, PerGroup};
+use crate::group::{Health, Loaded, Number, PerGroup};
 use crate::page::Pages;
 use crate::scan::{Content, Entry, First, Scan, Slot};
 
@@ -46,7 +46,7 @@ impl<F: ReadNorFlash> View<F> {
     /// # Errors
     /// [`Error::BufferTooSmall`]; [`Error::Corrupt`] when the flash has changed since it was opened;
     /// [`Error::Flash`]. After an error the content of `buf` has no meaning.
-    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    pub fn load(&mut self, group: Number, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         let Content::Value(slot) = self.state.groups.get(group).content else { return Ok(None) };
         let len = slot.len as usize;
         let target = buf.get_mut(..len).ok_or(Error::BufferTooSmall)?;
@@ -61,7 +61,7 @@ impl<F: ReadNorFlash> View<F> {
     /// Errors of [`View::load`].
     pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
         let mut buf = [0; DeviceRecord::ROOM];
-        match self.load(Group::Device, &mut buf) {
+        match self.load(DeviceRecord::NUMBER, &mut buf) {
             Ok(Some(loaded)) => {
                 Ok(buf.get(..loaded.len).and_then(|value| DeviceRecord::decode(loaded.version, value)))
             }
@@ -72,7 +72,7 @@ impl<F: ReadNorFlash> View<F> {
 
     /// Whether the newest values of a group could be read when the store was opened.
     #[must_use]
-    pub fn health(&self, group: Group) -> Health {
+    pub fn health(&self, group: Number) -> Health {
         *self.health.get(group)
     }
 
@@ -147,7 +147,7 @@ pub(crate) fn follows(x: u16, y: u16) -> bool {
 
 /// The state of a group. A page in use that says it was left means that its successor cannot be read; with no page in
 /// use, damage in either may be all that is left of a value.
-fn merge(current: &Scan, other: &Scan, group: Group) -> Entry {
+fn merge(current: &Scan, other: &Scan, group: Number) -> Entry {
     let (mine, theirs) = (current.groups.get(group), other.groups.get(group));
     let successor_lost = current.left || (current.generation.is_none() && theirs.suspect);
     Entry { suspect: mine.suspect || successor_lost, ..*mine }

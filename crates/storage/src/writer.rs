@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words};
-use crate::group::{Change, Group, GroupSet, PerGroup};
+use crate::group::{Change, GroupSet, Number, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
 
@@ -103,7 +103,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.program(MARK)
     }
 
-    fn record(&mut self, group: Group, record: &Record<'_>, generation: u16) -> Result<(), Error<F::Error>> {
+    fn record(&mut self, group: Number, record: &Record<'_>, generation: u16) -> Result<(), Error<F::Error>> {
         let (kind, version) = match *record {
             Record::Set { version, .. } | Record::Kept(Slot { version, .. }) => (KIND_VALUE, version),
             Record::Restored => (KIND_RESTORED, 0),

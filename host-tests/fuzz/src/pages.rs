@@ -2,11 +2,11 @@
 
 use arbitrary::{Arbitrary, Unstructured};
 use storage::mock::{MockFlash, PowerCut, Weak};
-use storage::{Change, Error, Group, Health, Loaded, Pages, Store, View};
+use storage::{Change, Error, Health, Loaded, Number, Pages, Store, View};
 
 const PAGE: usize = 512;
 const PAGES: Pages = Pages::new(0, 512);
-const GROUPS: [Group; 4] = [Group::Communication, Group::Application, Group::Calibration, Group::Device];
+const GROUPS: [Number; 4] = [Number::Two, Number::Three, Number::Four, Number::One];
 /// Longest value of a save.
 const LONGEST: usize = 64;
 
@@ -106,7 +106,7 @@ impl Bench {
     }
 
     /// Saves after a start, as the pages are small.
-    fn save(&mut self, group: Group, change: &Change<'_>, value: Read) {
+    fn save(&mut self, group: Number, change: &Change<'_>, value: Read) {
         self.restart();
         let Ok(view) = View::open(&mut self.flash, PAGES) else { return };
         let result = Store::prepare(view).and_then(|mut store| store.save(std::slice::from_ref(change)));

@@ -2,7 +2,7 @@
 
 use crate::model::{Changes, as_changes, set, start};
 use storage::mock::MockFlash;
-use storage::{Group, MAX_VALUE, Pages};
+use storage::{MAX_VALUE, Number, Pages};
 
 const PAGE: usize = 16 * 1024;
 const PAGES: Pages = Pages::new(0, 16 * 1024);
@@ -16,7 +16,7 @@ fn blank() -> MockFlash<PAGE> {
 }
 
 /// Sizes of the groups that are saved at once.
-type Sizes = [(Group, usize)];
+type Sizes = [(Number, usize)];
 
 /// The save of that number: no value is that of the save before.
 fn changes(sizes: &Sizes, number: usize) -> Changes {
@@ -48,14 +48,10 @@ fn words_of_saves(sizes: &Sizes, count: usize) -> Vec<u32> {
 
 #[test]
 fn saves_until_a_restart_and_until_worn_out() {
-    let largest = Group::ALL.map(|group| (group, MAX_VALUE));
+    let largest = Number::ALL.map(|group| (group, MAX_VALUE));
     let sets: [(&str, &Sizes, usize); 3] = [
-        ("application group, 212 B", &[(Group::Application, 212)], 136),
-        (
-            "communication and application groups, 1405 B",
-            &[(Group::Communication, 1193), (Group::Application, 212)],
-            22,
-        ),
+        ("application group, 212 B", &[(Number::Three, 212)], 136),
+        ("communication and application groups, 1405 B", &[(Number::Two, 1193), (Number::Three, 212)], 22),
         ("all four groups at their most, 8192 B", &largest, 2),
     ];
     for (name, sizes, expected) in sets {

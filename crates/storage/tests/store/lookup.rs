@@ -2,7 +2,7 @@
 
 use crate::model::{as_changes, noise, set, start};
 use storage::mock::{MockFlash, Weak};
-use storage::{Change, DeviceRecord, Group, Pages, device_record};
+use storage::{Change, DeviceRecord, Number, Pages, device_record};
 
 const PAGES: Pages = Pages::new(0, 512);
 type Flash = MockFlash<512, 4>;
@@ -14,14 +14,14 @@ fn record(node_id: u8) -> DeviceRecord {
 fn save(flash: &mut Flash, node_id: u8) -> bool {
     let value = record(node_id).encode();
     let Ok(mut store) = start(flash, PAGES) else { return false };
-    store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value: &value }]).is_ok()
+    store.save(&[Change::Set { group: Number::One, version: DeviceRecord::VERSION, value: &value }]).is_ok()
 }
 
 #[test]
 fn there_is_none_where_none_was_saved() {
     let mut flash = Flash::new(1024, 0);
     assert_eq!(device_record(&mut flash, PAGES), None);
-    start(&mut flash, PAGES).unwrap().save(&as_changes(&vec![set(Group::Application, 1, 8)])).unwrap();
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&vec![set(Number::Three, 1, 8)])).unwrap();
     assert_eq!(device_record(&mut flash, PAGES), None);
     assert_eq!(device_record(&mut flash, Pages::new(0, 4096)), None, "pages beyond the flash");
 }
@@ -33,7 +33,7 @@ fn it_is_the_one_that_was_saved_last() {
     for round in 1..=120 {
         assert!(save(&mut flash, round));
         let value = noise(u64::from(round), 40);
-        let change = Change::Set { group: Group::Application, version: 1, value: &value };
+        let change = Change::Set { group: Number::Three, version: 1, value: &value };
         start(&mut flash, PAGES).unwrap().save(&[change]).unwrap();
         assert_eq!(device_record(&mut flash, PAGES), Some(record(round)));
     }

@@ -1,16 +1,16 @@
 //! The plain model that the store is compared with, and what runs both.
 
 use storage::mock::{MockFlash, PowerCut};
-use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
+use storage::{Change, Error, Health, MAX_VALUE, Number, Pages, Store, View};
 
 /// A version and a value, or nothing.
 pub(crate) type Value = Option<(u16, Vec<u8>)>;
 
-/// What should be stored, in the order of [`Group::ALL`].
+/// What should be stored, in the order of [`Number::ALL`].
 pub(crate) type Model = [Value; 4];
 
 /// What a save changes.
-pub(crate) type Changes = Vec<(Group, Value)>;
+pub(crate) type Changes = Vec<(Number, Value)>;
 
 /// Nothing stored.
 pub(crate) const EMPTY: Model = [None, None, None, None];
@@ -25,12 +25,12 @@ pub(crate) enum Step {
 }
 
 /// Sets a group to `len` bytes of noise.
-pub(crate) fn set(group: Group, version: u16, len: usize) -> (Group, Value) {
+pub(crate) fn set(group: Number, version: u16, len: usize) -> (Number, Value) {
     (group, Some((version, noise(u64::from(version), len))))
 }
 
 /// Restores the defaults of a group.
-pub(crate) fn restore(group: Group) -> (Group, Value) {
+pub(crate) fn restore(group: Number) -> (Number, Value) {
     (group, None)
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
 pub(crate) fn after(model: &Model, changes: &Changes) -> Model {
     let mut model = model.clone();
     for (group, value) in changes {
-        let place = Group::ALL.iter().position(|g| g == group).unwrap();
+        let place = Number::ALL.iter().position(|g| g == group).unwrap();
         model[place].clone_from(value);
     }
     model
@@ -55,7 +55,7 @@ pub(crate) fn as_changes(changes: &Changes) -> Vec<Change<'_>> {
     changes.iter().map(as_change).collect()
 }
 
-fn as_change((group, value): &(Group, Value)) -> Change<'_> {
+fn as_change((group, value): &(Number, Value)) -> Change<'_> {
     match value {
         Some((version, value)) => Change::Set { group: *group, version: *version, value },
         None => Change::Restore(*group),
@@ -68,12 +68,12 @@ pub(crate) fn read<const ERASE: usize, const WORD: usize>(
     pages: Pages,
 ) -> (Model, [Health; 4]) {
     let mut view = View::open(flash, pages).unwrap();
-    let value = Group::ALL.map(|group| {
+    let value = Number::ALL.map(|group| {
         let mut buf = [0; MAX_VALUE];
         let loaded = view.load(group, &mut buf).unwrap()?;
         Some((loaded.version, buf[..loaded.len].to_vec()))
     });
-    (value, Group::ALL.map(|group| view.health(group)))
+    (value, Number::ALL.map(|group| view.health(group)))
 }
 
 /// What the flash holds when nothing may be doubtful.
