@@ -24,6 +24,7 @@
 
 // The rows of an object are at most 255.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+#![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 pub mod pdo;
 mod program;

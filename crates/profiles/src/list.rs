@@ -46,6 +46,7 @@ macro_rules! personalities {
             }
 
             /// Its dictionary.
+            #[allow(clippy::indexing_slicing, reason = "there is one of each")]
             #[must_use]
             pub const fn dictionary(self) -> &'static canopen::dictionary::Dictionary {
                 match self {
@@ -103,6 +104,7 @@ macro_rules! personalities {
                     own::fields(list::Personality::$Name.dictionary());
 
                 // A row that neither its profile nor the node handles, or a rule without a row, does not compile.
+                #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
                 const _: () = {
                     let mut i = 0;
                     while i < ROWS.len() {

@@ -1,4 +1,5 @@
 //! Tables of rows, put together during compilation: every panic here is an error of the compiler.
+#![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use canopen::dictionary::{Access, Object, Rule, Type};
 

@@ -99,6 +99,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
+// Nothing that comes from the bus or from the flash may panic or index out of range.
+#![cfg_attr(
+    not(any(test, feature = "mock")),
+    warn(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
 
 #[cfg(any(test, feature = "mock"))]
 extern crate std;

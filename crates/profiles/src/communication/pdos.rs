@@ -1,5 +1,6 @@
 //! PDO objects: eight PDOs each way. RPDOs wait for a use in every personality; what a TPDO is by default is a matter of
 //! the personality.
+#![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use canopen::dictionary::{self, DefaultValue, Object};
 use canopen::objects;

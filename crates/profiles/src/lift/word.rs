@@ -136,6 +136,7 @@ impl Light {
     }
 
     /// Milliseconds of the period of a flashing lamp.
+    #[allow(clippy::indexing_slicing, reason = "three bits index eight periods")]
     #[must_use]
     pub const fn period(self) -> Option<u32> {
         const PERIODS: [u32; 8] = [100, 133, 200, 500, 666, 1000, 2000, 4000];

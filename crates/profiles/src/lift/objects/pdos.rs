@@ -2,6 +2,7 @@
 //!
 //! A device has those of the virtual devices that it is. Nothing of the generic set of CiA 301 (1800h to 1803h with 180h +
 //! node-ID and up) is among them, so no PDO of a lift device can have the CAN-ID of another one of the same device.
+#![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use crate::communication::{self, inhibit_time, sync_start};
 use crate::lift::catalogue::{CobId, Content, Pdo, by_number};

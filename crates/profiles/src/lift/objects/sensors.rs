@@ -1,4 +1,5 @@
 //! The position sensors of the lift are described as those of the encoder are: 2100h to 2106h.
+#![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use crate::encoder;
 use canopen::dictionary::Object;
