@@ -23,22 +23,22 @@ const AUTHORISATION: &[Object] = if AUTHORISATION_KEY.is_some() {
     &[]
 };
 
+/// 1F51h, whose commands the bootloader decides on.
+const CONTROL: [Object; 2] = {
+    let [highest, control] = objects::program_control();
+    [highest, control.handled()]
+};
+
 pub(crate) const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(BOOT), objects::error_register(), objects::device_name("Bootloader")],
     [objects::hardware_version(""), objects::software_version(env!("CARGO_PKG_VERSION"))],
     [objects::heartbeat_producer(1000)],
     objects::identity(0, 0, 0),
     AUTHORISATION,
-    [
-        Object::highest(0x1F50, 1, "Program data"),
-        Object::new(0x1F50, 1, "Program 1 data", Type::Domain, Access::WriteOnly),
-        Object::highest(0x1F51, 1, "Program control"),
-        Object::new(0x1F51, 1, "Program 1 control", Type::Unsigned8, Access::ReadWrite).handled(),
-        Object::highest(0x1F56, 1, "Program identification"),
-        fixed(0x1F56, 1, "Program 1 identification", Type::Unsigned32),
-        Object::highest(0x1F57, 1, "Flash status"),
-        fixed(0x1F57, 1, "Program 1 flash status", Type::Unsigned32),
-    ],
+    objects::program_data(),
+    CONTROL,
+    objects::program_identification(),
+    objects::flash_status(),
 );
 
 pub(crate) static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);

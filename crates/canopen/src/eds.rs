@@ -96,8 +96,8 @@ fn write_object(rows: &[Object], out: &mut impl Write) -> Result {
         let object_type = if head.kind == Type::Domain { 2 } else { 7 };
         return write_entry(head, object_type, out);
     }
-    let is_array =
-        !is_record(head.index) && subs.windows(2).all(|pair| pair[0].kind.code() == pair[1].kind.code());
+    let first = subs.first().map(|row| row.kind.code());
+    let is_array = !is_record(head.index) && subs.iter().all(|row| Some(row.kind.code()) == first);
     writeln!(out, "[{:04X}]\nParameterName={}", head.index, head.name)?;
     writeln!(out, "ObjectType=0x{}\nSubNumber={}\n", if is_array { 8 } else { 9 }, rows.len())?;
     for row in rows {

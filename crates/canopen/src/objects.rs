@@ -22,11 +22,17 @@
 //! assert_eq!(DICTIONARY.find(0x1A00, 1).map(|entry| entry.index()), Ok(0x1A00));
 //! ```
 
-// The rows of an object are at most 128.
+// The rows of an object are at most 255.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+#![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+
+pub mod pdo;
+mod program;
 
 use crate::dictionary::{Access, DefaultValue, Group, Object, Type};
-use crate::pdo::MappedObject;
+
+pub use pdo::{rpdo, tpdo};
+pub use program::{flash_status, program_control, program_data, program_identification};
 
 /// A value that the device gives.
 const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -196,91 +202,30 @@ pub const fn start_up() -> Object {
     parameter(0x1F80, 0, "NMT start-up", Type::Unsigned32)
 }
 
-/// The default COB-ID of a PDO: one of the four of the pre-defined connection set (CiA 301, 7.3.5); any other is off.
-const fn cob_id(base: u32, number: u16, is_on: bool) -> DefaultValue {
-    let off = if is_on { 0 } else { 1 << 31 };
-    match number {
-        1..=4 => DefaultValue::NodeId(off + base + 0x100 * (number as u32 - 1)),
-        _ => DefaultValue::Integer(1 << 31),
-    }
-}
-
-/// An RPDO, 1 to 512, taken when it comes: 1400h + `number` - 1 and 1600h + `number` - 1. It writes these objects and has
-/// eight places for them; without objects it is off.
+/// 1FA0h: the objects that the multiplexed PDO in scanner mode reads in turn, `N` - 1 of them.
 ///
 /// # Panics
-/// During compilation, for a number that no RPDO has, and for objects that do not fit.
+/// During compilation, for more than 254.
 #[must_use]
-pub const fn rpdo(number: u16, objects: &[Object]) -> [Object; 13] {
-    assert!(number >= 1 && number <= 512, "an RPDO has a number from 1 to 512");
-    let index = 0x1400 + number - 1;
-    let mapped = mapping(index + 0x200, "RPDO mapping parameter", objects, false);
-    [
-        Object::highest(index, 5, "RPDO communication parameter"),
-        parameter(index, 1, "COB-ID", Type::Unsigned32).default(cob_id(0x200, number, !objects.is_empty())),
-        parameter(index, 2, "Transmission type", Type::Unsigned8).value(255),
-        parameter(index, 5, "Event timer", Type::Unsigned16).unit("ms"),
-        mapped[0],
-        mapped[1],
-        mapped[2],
-        mapped[3],
-        mapped[4],
-        mapped[5],
-        mapped[6],
-        mapped[7],
-        mapped[8],
-    ]
+pub const fn scanner_list<const N: usize>() -> [Object; N] {
+    assert!(N >= 2 && N <= 255, "one to 254 objects are scanned");
+    let number = parameter(0x1FA0, 0, "Object scanner list", Type::Unsigned8).limits(0, N as i64 - 1);
+    list(number, parameter(0x1FA0, 1, "Scanned objects", Type::Unsigned32))
 }
 
-/// A TPDO, 1 to 512, sent with every change of these objects: 1800h + `number` - 1 and 1A00h + `number` - 1. It has eight
-/// places for objects; without objects it is off.
+/// 1FD0h: where the objects of multiplexed PDOs in source address mode go, `N` - 1 lines.
 ///
 /// # Panics
-/// During compilation, for a number that no TPDO has, and for objects that do not fit.
+/// During compilation, for more than 254.
 #[must_use]
-pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
-    assert!(number >= 1 && number <= 512, "a TPDO has a number from 1 to 512");
-    let index = 0x1800 + number - 1;
-    let mapped = mapping(index + 0x200, "TPDO mapping parameter", objects, true);
-    [
-        Object::highest(index, 6, "TPDO communication parameter"),
-        parameter(index, 1, "COB-ID", Type::Unsigned32).default(cob_id(0x180, number, !objects.is_empty())),
-        parameter(index, 2, "Transmission type", Type::Unsigned8).value(255),
-        parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us"),
-        parameter(index, 5, "Event timer", Type::Unsigned16).unit("ms"),
-        parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240),
-        mapped[0],
-        mapped[1],
-        mapped[2],
-        mapped[3],
-        mapped[4],
-        mapped[5],
-        mapped[6],
-        mapped[7],
-        mapped[8],
-    ]
+pub const fn dispatching_list<const N: usize>() -> [Object; N] {
+    assert!(N >= 2 && N <= 255, "the list has one to 254 lines");
+    let number = parameter(0x1FD0, 0, "Object dispatching list", Type::Unsigned8).limits(0, N as i64 - 1);
+    list(number, parameter(0x1FD0, 1, "Dispatched objects", Type::Unsigned64))
 }
 
-const fn mapping(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
-    assert!(objects.len() <= 8, "a PDO has eight places");
-    let number = parameter(index, 0, name, Type::Unsigned8).value(objects.len() as i64);
-    let mut rows: [Object; 9] = list(number, parameter(index, 1, "Mapped object", Type::Unsigned32));
-    let (mut i, mut len) = (0, 0);
-    while i < objects.len() {
-        let (object, mapping) = (&objects[i], objects[i].mapping);
-        assert!(!is_sent || mapping.allows_tpdo(), "an object cannot be mapped into a TPDO");
-        assert!(is_sent || mapping.allows_rpdo(), "an object cannot be mapped into an RPDO");
-        len += object.kind.size();
-        let mapped = MappedObject { index: object.index, sub: object.sub, bits: object.kind.size() * 8 };
-        rows[i + 1] = rows[i + 1].value(mapped.encode() as i64);
-        i += 1;
-    }
-    assert!(len <= 8, "the objects are longer than a PDO");
-    rows
-}
-
-/// The default of a row of a PDO's communication parameter replaced: for a transmission type (`sub` 2), an inhibit time
-/// (3, TPDO only) or an event timer (5) of its own.
+/// The default of a row replaced: for a transmission type (`sub` 2), an inhibit time (3, TPDO only) or an event timer (5) of a
+/// PDO, or for another sub-index of the first object of these rows.
 ///
 /// # Panics
 /// During compilation, when there is no such row.

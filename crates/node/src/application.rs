@@ -4,7 +4,7 @@ use canopen::dictionary::{Entry, Group, Groups};
 use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Application, Condition, Part, Soundness};
+use canopen::{Application, Condition, ErrorClass, Part, Soundness};
 use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL};
 use profiles::fault::Flags;
 use profiles::{AnyProfile, Snapshot};
@@ -128,6 +128,14 @@ impl Application for NodeApplication {
 
     fn state(&mut self, state: State, image: &mut [u8]) {
         self.profile.state(state, image);
+    }
+
+    fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]) {
+        self.profile.synchronised(counter, image);
+    }
+
+    fn error(&mut self, class: ErrorClass, image: &mut [u8]) {
+        self.profile.error(class, image);
     }
 
     fn fault(&mut self, _: Fault, _: bool, image: &mut [u8]) {

@@ -40,6 +40,7 @@ const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 pub static FAULTS: [Fault; count(LISTS)] = gather(LISTS);
 
 /// The faults with their error codes, in the same order.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 pub(crate) const CONDITIONS: [Condition; count(LISTS)] = {
     let faults: [Fault; count(LISTS)] = gather(LISTS);
     let mut conditions = [Condition::new(0); count(LISTS)];

@@ -1,7 +1,7 @@
 //! The identity of the device in the parameter store, and whether the record could be read.
 
 use embedded_storage::nor_flash::ReadNorFlash;
-use storage::{DeviceRecord, Health, ParameterGroup, View};
+use storage::{DeviceRecord, Health, View};
 
 use crate::Fault;
 use crate::fault::{BOOT_DATA, OLDER_BOOT_DATA};
@@ -20,8 +20,8 @@ impl Identity {
     #[inline(never)]
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Identity {
         let record = view.device().ok().flatten();
-        let is_stored = !matches!(view.load(ParameterGroup::Device, &mut [0; DeviceRecord::ROOM]), Ok(None));
-        let fault = match (view.health(ParameterGroup::Device), record) {
+        let is_stored = !matches!(view.load(DeviceRecord::NUMBER, &mut [0; DeviceRecord::ROOM]), Ok(None));
+        let fault = match (view.health(DeviceRecord::NUMBER), record) {
             (Health::Good, Some(_)) => None,
             (Health::Good, None) => is_stored.then_some(&BOOT_DATA),
             (_, None) => Some(&BOOT_DATA),

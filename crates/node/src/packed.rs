@@ -2,6 +2,7 @@
 
 use canopen::dictionary::Group;
 use heapless::{Vec, VecView};
+use storage::GroupNumber;
 
 const COMMUNICATION: usize = profiles::packed_size(Group::Communication);
 const APPLICATION: usize = profiles::packed_size(Group::Application);
@@ -61,11 +62,23 @@ impl PackedGroups {
     }
 }
 
-/// The group of the parameter store that holds a group of the dictionary.
-pub(crate) const fn record_of(group: Group) -> storage::ParameterGroup {
+/// Under which number the parameter store holds a group. One is the device record.
+pub(crate) const fn number_of(group: Group) -> GroupNumber {
     match group {
-        Group::Communication => storage::ParameterGroup::Communication,
-        Group::Application => storage::ParameterGroup::Application,
-        Group::Calibration => storage::ParameterGroup::Calibration,
+        Group::Communication => GroupNumber::Two,
+        Group::Application => GroupNumber::Three,
+        Group::Calibration => GroupNumber::Four,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_group_has_a_number_of_its_own() {
+        let [first, second, third] = Group::ALL.map(number_of);
+        assert!(first != second && second != third && first != third);
+        assert!(Group::ALL.iter().all(|group| number_of(*group) != storage::DeviceRecord::NUMBER));
     }
 }

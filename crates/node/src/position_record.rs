@@ -5,7 +5,7 @@
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use profiles::board::{POSITION_RECORD_WORDS, RETAINED_WORDS};
 use profiles::encoder::PositionRecord;
-use storage::{Change, DeviceRecord, Error, Loaded, ParameterGroup, Store, View};
+use storage::{Change, DeviceRecord, Error, Loaded, Store, View};
 
 /// The bytes of a device record.
 type Device = [u8; DeviceRecord::LEN];
@@ -36,7 +36,7 @@ impl StoredPositionRecord {
     /// The stored record; `None` if nothing is stored, or nothing that can be read.
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; POSITION_RECORD_WORDS]> {
         let mut value: Value = [0; DeviceRecord::ROOM];
-        let loaded = view.load(ParameterGroup::Device, &mut value);
+        let loaded = view.load(DeviceRecord::NUMBER, &mut value);
         let tail = tail(loaded, &value)?.as_chunks::<4>().0;
         let words: &[[u8; 4]; POSITION_RECORD_WORDS] = tail.try_into().ok()?;
         Some(words.map(u32::from_le_bytes))
@@ -74,7 +74,7 @@ pub(crate) fn replace_device<F: NorFlash>(
     store: &mut Store<F>,
 ) -> Result<(), Error<F::Error>> {
     let mut value: Value = [0; DeviceRecord::ROOM];
-    let loaded = store.load(ParameterGroup::Device, &mut value);
+    let loaded = store.load(DeviceRecord::NUMBER, &mut value);
     save(device, tail(loaded, &value).unwrap_or_default(), store)
 }
 
@@ -89,7 +89,7 @@ fn save<F: NorFlash>(device: Device, tail: &[u8], store: &mut Store<F>) -> Resul
     let mut value: Value = [0; DeviceRecord::ROOM];
     value.iter_mut().zip(device.iter().chain(tail)).for_each(|(to, from)| *to = *from);
     let value = value.get(..DeviceRecord::LEN + tail.len()).unwrap_or(&value);
-    store.save(&[Change::Set { group: ParameterGroup::Device, version: DeviceRecord::VERSION, value }])
+    store.save(&[Change::Set { group: DeviceRecord::NUMBER, version: DeviceRecord::VERSION, value }])
 }
 
 #[cfg(test)]

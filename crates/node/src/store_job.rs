@@ -8,7 +8,7 @@ use heapless::Vec;
 use profiles::{IMAGE_SIZE, Personality};
 use storage::{Change, DeviceRecord, Error, Store};
 
-use crate::packed::{PackedGroups, record_of};
+use crate::packed::{PackedGroups, number_of};
 use crate::position_record;
 use crate::stored::{layout, layout_of};
 
@@ -53,7 +53,7 @@ impl StoreJob {
         let changes = match self.job {
             None | Some(Job::Configure(_) | Job::Setting(_)) => Vec::new(),
             Some(Job::Store(groups)) => each(groups, |group| self.stored(group)),
-            Some(Job::Restore(groups)) => each(groups, |group| Change::Restore(record_of(group))),
+            Some(Job::Restore(groups)) => each(groups, |group| Change::Restore(number_of(group))),
         };
         store.save(&changes).map_err(|error| abort_of(&error))
     }
@@ -70,7 +70,7 @@ impl StoreJob {
 
     fn stored(&self, group: Group) -> Change<'_> {
         let version = layout_of(group, layout(self.personality));
-        Change::Set { group: record_of(group), version, value: self.packed.get(group) }
+        Change::Set { group: number_of(group), version, value: self.packed.get(group) }
     }
 }
 

@@ -7,7 +7,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 use profiles::Personality;
 use storage::{Health, View};
 
-use crate::packed::{PackedGroups, record_of};
+use crate::packed::{PackedGroups, number_of};
 
 /// Version of the packed form (`canopen::dictionary`). The form itself lists the objects that it holds, so a dictionary
 /// that grows needs no new version.
@@ -46,7 +46,7 @@ impl Stored {
                 is_readable = read.is_some();
                 read.unwrap_or(0)
             });
-            let health = if is_readable { view.health(record_of(group)) } else { Health::Lost };
+            let health = if is_readable { view.health(number_of(group)) } else { Health::Lost };
             self.lost.set(group, health == Health::Lost);
             self.older.set(group, health == Health::FellBack);
         }
@@ -76,7 +76,7 @@ impl Stored {
 
 /// Number of stored bytes of the group; `None` for a damaged group. A group that was never stored is not damaged.
 fn read<F: ReadNorFlash>(group: Group, layout: u16, view: &mut View<F>, bytes: &mut [u8]) -> Option<usize> {
-    match view.load(record_of(group), bytes) {
+    match view.load(number_of(group), bytes) {
         Ok(Some(loaded)) if loaded.version == layout => Some(loaded.len).filter(|len| *len > 0),
         // Values that another personality has stored do not apply to this one.
         Ok(Some(loaded)) => (loaded.version.to_le_bytes()[0] == FORM).then_some(0),

@@ -46,6 +46,7 @@ impl Flags {
 }
 
 /// Number of faults in all lists.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 #[must_use]
 pub const fn count(lists: &[&[Fault]]) -> usize {
     let (mut total, mut i) = (0, 0);
@@ -60,6 +61,7 @@ pub const fn count(lists: &[&[Fault]]) -> usize {
 ///
 /// # Panics
 /// During compilation, if `N` is another number.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 #[must_use]
 pub const fn gather<const N: usize>(lists: &[&[Fault]]) -> [Fault; N] {
     let mut all = [Fault { name: "", condition: Condition::new(0), flags: Flags::NONE }; N];

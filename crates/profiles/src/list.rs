@@ -46,6 +46,7 @@ macro_rules! personalities {
             }
 
             /// The dictionary.
+            #[allow(clippy::indexing_slicing, reason = "there is one of each")]
             #[must_use]
             pub const fn dictionary(self) -> &'static canopen::dictionary::Dictionary {
                 match self {
@@ -104,6 +105,7 @@ macro_rules! personalities {
 
                 // Does not compile if a row marked as handled has no rule in its profile or in the node, or if a rule
                 // has no such row.
+                #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
                 const _: () = {
                     let mut i = 0;
                     while i < ROWS.len() {
@@ -360,6 +362,22 @@ macro_rules! personalities {
                 use $crate::profile::Profile;
                 match self {
                     $(AnyProfile::$Name(own) => own.state(state, image),)+
+                }
+            }
+
+            /// As [`Profile::synchronised`]($crate::profile::Profile::synchronised).
+            pub fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]) {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.synchronised(counter, image),)+
+                }
+            }
+
+            /// As [`Profile::error`]($crate::profile::Profile::error).
+            pub fn error(&mut self, class: canopen::ErrorClass, image: &mut [u8]) {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.error(class, image),)+
                 }
             }
 

@@ -1,5 +1,6 @@
 //! Two profiles in one dictionary, as one profile.
 
+use canopen::ErrorClass;
 use canopen::dictionary::Entry;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
@@ -97,6 +98,16 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         self.1.state(state, image);
     }
 
+    fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]) {
+        self.0.synchronised(counter, image);
+        self.1.synchronised(counter, image);
+    }
+
+    fn error(&mut self, class: ErrorClass, image: &mut [u8]) {
+        self.0.error(class, image);
+        self.1.error(class, image);
+    }
+
     fn faults((first, second): &Snapshot<Self>, each: &mut impl FnMut(&'static Fault, bool)) {
         A::faults(first, each);
         B::faults(second, each);
@@ -145,5 +156,68 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         let mut digital: [bool; DIGITAL_OUTPUTS] = first;
         digital.iter_mut().zip(second).for_each(|(on, other)| *on |= other);
         Outputs { digital }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Nothing;
+
+    impl Chain for Nothing {
+        type Parameters = ();
+        type Snapshot = ();
+
+        fn new(_: &PowerOn) -> Nothing {
+            Nothing
+        }
+
+        fn apply(&mut self, (): &()) {}
+
+        fn update(&mut self, _: &Inputs, (): &mut ()) {}
+    }
+
+    /// A profile that leaves what it was told at its own place in the image.
+    struct Witness(usize);
+
+    impl Profile for Witness {
+        type Chain = Nothing;
+        type Fields = usize;
+
+        fn new(place: &'static usize) -> Witness {
+            Witness(*place)
+        }
+
+        fn parameters(&self, _: &[u8]) {}
+
+        fn publish(&mut self, (): &(), _: &mut [u8]) {}
+
+        fn handles(&self, _: u16, _: u8) -> bool {
+            false
+        }
+
+        fn write(&mut self, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+            Err(Abort::Access)
+        }
+
+        fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]) {
+            image[self.0] = counter.unwrap_or(0xFF);
+        }
+
+        fn error(&mut self, class: ErrorClass, image: &mut [u8]) {
+            image[self.0] = class.0;
+        }
+    }
+
+    #[test]
+    fn both_are_told_of_a_sync_and_of_an_error() {
+        let (mut pair, mut image) = (Pair::<Witness, Witness>::new(&(0, 1)), [0; 2]);
+        pair.synchronised(Some(7), &mut image);
+        assert_eq!(image, [7, 7]);
+        pair.synchronised(None, &mut image);
+        assert_eq!(image, [0xFF, 0xFF]);
+        pair.error(ErrorClass::DEVICE, &mut image);
+        assert_eq!(image, [2, 2]);
     }
 }

@@ -6,6 +6,7 @@
 //!                     ◀───── Parameters ─────────────
 //! ```
 
+use canopen::ErrorClass;
 use canopen::dictionary::Entry;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
@@ -82,6 +83,14 @@ pub trait Profile: Sized {
 
     /// The NMT state has changed.
     fn state(&mut self, _state: State, _image: &mut [u8]) {}
+
+    /// A SYNC has come in the state Operational, with its counter where 1019h asks for one. What synchronous RPDOs have
+    /// brought is in the image; what synchronous TPDOs carry is read from the image afterwards.
+    fn synchronised(&mut self, _counter: Option<u8>, _image: &mut [u8]) {}
+
+    /// An error of this class has happened, such as a missing heartbeat or bus-off; the NMT state then changes as 1029h
+    /// says.
+    fn error(&mut self, _class: ErrorClass, _image: &mut [u8]) {}
 
     /// Calls `each` with every fault that the profile detects, always in the same order, and whether the values show
     /// the fault.

@@ -1,4 +1,5 @@
 //! Tables of rows, combined during compilation: every panic here is a compile error.
+#![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use canopen::dictionary::{Access, Object, Rule, Type};
 

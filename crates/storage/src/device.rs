@@ -1,5 +1,6 @@
-//! The value of [`ParameterGroup::Device`](crate::ParameterGroup::Device): the data that a node needs before it can go
-//! on the bus.
+//! The value of the group [`DeviceRecord::NUMBER`]: what a node must know before it can go on the bus.
+
+use crate::group::GroupNumber;
 
 /// Node-ID, bit rate and personality. A value of this type is always valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,6 +11,8 @@ pub struct DeviceRecord {
 }
 
 impl DeviceRecord {
+    /// The group that holds the record.
+    pub const NUMBER: GroupNumber = GroupNumber::One;
     /// Layout version under which the record is stored.
     pub const VERSION: u16 = 1;
     /// Length of the stored record in bytes.

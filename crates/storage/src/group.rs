@@ -1,39 +1,29 @@
 //! The parameter groups, and types for their state and changes.
 
-/// A set of parameters that is saved, restored and loaded as a whole.
+/// The number of a parameter group: a set of parameters that is saved, restored and loaded as a whole. What a group holds is
+/// the caller's decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ParameterGroup {
-    /// Node-ID, bit rate and personality, set by LSS (CiA 305) and by the factory. See [`crate::DeviceRecord`].
-    Device,
-    /// Communication parameters, 1000h to 1FFFh (1010h sub-index 2).
-    Communication,
-    /// Application parameters, 6000h to 9FFFh and the user storage 4000h (1010h sub-index 3).
-    Application,
-    /// Calibration of the measuring channels: set in production, not affected by 1011h.
-    Calibration,
+#[repr(u8)]
+#[allow(missing_docs)] // The variants are the numbers.
+pub enum GroupNumber {
+    One = 1,
+    Two,
+    Three,
+    Four,
 }
 
-impl ParameterGroup {
-    /// Every group, in the order of the records in a transaction.
-    pub const ALL: [ParameterGroup; 4] = [
-        ParameterGroup::Device,
-        ParameterGroup::Communication,
-        ParameterGroup::Application,
-        ParameterGroup::Calibration,
-    ];
+impl GroupNumber {
+    /// All of them, in the order in which a transaction holds their groups.
+    pub const ALL: [GroupNumber; 4] =
+        [GroupNumber::One, GroupNumber::Two, GroupNumber::Three, GroupNumber::Four];
 
     /// The number of the group in flash. A number is never reused for another purpose.
     pub(crate) const fn id(self) -> u8 {
-        match self {
-            ParameterGroup::Device => 1,
-            ParameterGroup::Communication => 2,
-            ParameterGroup::Application => 3,
-            ParameterGroup::Calibration => 4,
-        }
+        self as u8
     }
 
-    pub(crate) fn from_id(id: u8) -> Option<ParameterGroup> {
-        ParameterGroup::ALL.into_iter().find(|group| group.id() == id)
+    pub(crate) fn from_id(id: u8) -> Option<GroupNumber> {
+        GroupNumber::ALL.into_iter().find(|number| number.id() == id)
     }
 }
 
@@ -56,20 +46,20 @@ pub enum Change<'a> {
     /// Gives the group this value.
     Set {
         /// The group.
-        group: ParameterGroup,
+        group: GroupNumber,
         /// Version of the value's layout; `load` returns it so that the caller can migrate or refuse old data.
         version: u16,
         /// The value, at most [`crate::MAX_VALUE`] bytes. It may be empty.
         value: &'a [u8],
     },
-    /// Removes the stored value of the group, so that the caller's defaults are in use (1011h).
-    Restore(ParameterGroup),
+    /// The group has no stored value any more: the caller's defaults hold.
+    Restore(GroupNumber),
 }
 
 impl Change<'_> {
     /// The changed group.
     #[must_use]
-    pub fn group(&self) -> ParameterGroup {
+    pub fn group(&self) -> GroupNumber {
         match *self {
             Change::Set { group, .. } | Change::Restore(group) => group,
         }
@@ -93,11 +83,11 @@ impl GroupSet {
     pub(crate) const NONE: GroupSet = GroupSet(0);
     pub(crate) const ALL: GroupSet = GroupSet(0xF);
 
-    pub(crate) fn contains(self, group: ParameterGroup) -> bool {
+    pub(crate) fn contains(self, group: GroupNumber) -> bool {
         self.0 & GroupSet::bit(group) != 0
     }
 
-    pub(crate) fn insert(&mut self, group: ParameterGroup) {
+    pub(crate) fn insert(&mut self, group: GroupNumber) {
         self.0 |= GroupSet::bit(group);
     }
 
@@ -106,7 +96,7 @@ impl GroupSet {
         GroupSet(self.0 & !other.0)
     }
 
-    fn bit(group: ParameterGroup) -> u8 {
+    fn bit(group: GroupNumber) -> u8 {
         1 << (group.id() - 1)
     }
 }
@@ -116,35 +106,35 @@ impl GroupSet {
 pub(crate) struct PerGroup<T>([T; 4]);
 
 impl<T> PerGroup<T> {
-    pub(crate) fn from_fn(mut make: impl FnMut(ParameterGroup) -> T) -> PerGroup<T> {
-        PerGroup(ParameterGroup::ALL.map(&mut make))
+    pub(crate) fn from_fn(mut make: impl FnMut(GroupNumber) -> T) -> PerGroup<T> {
+        PerGroup(GroupNumber::ALL.map(&mut make))
     }
 
-    pub(crate) fn get(&self, group: ParameterGroup) -> &T {
-        let [device, communication, application, calibration] = &self.0;
+    pub(crate) fn get(&self, group: GroupNumber) -> &T {
+        let [one, two, three, four] = &self.0;
         match group {
-            ParameterGroup::Device => device,
-            ParameterGroup::Communication => communication,
-            ParameterGroup::Application => application,
-            ParameterGroup::Calibration => calibration,
+            GroupNumber::One => one,
+            GroupNumber::Two => two,
+            GroupNumber::Three => three,
+            GroupNumber::Four => four,
         }
     }
 
-    pub(crate) fn get_mut(&mut self, group: ParameterGroup) -> &mut T {
-        let [device, communication, application, calibration] = &mut self.0;
+    pub(crate) fn get_mut(&mut self, group: GroupNumber) -> &mut T {
+        let [one, two, three, four] = &mut self.0;
         match group {
-            ParameterGroup::Device => device,
-            ParameterGroup::Communication => communication,
-            ParameterGroup::Application => application,
-            ParameterGroup::Calibration => calibration,
+            GroupNumber::One => one,
+            GroupNumber::Two => two,
+            GroupNumber::Three => three,
+            GroupNumber::Four => four,
         }
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (ParameterGroup, &T)> {
-        ParameterGroup::ALL.into_iter().zip(&self.0)
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (GroupNumber, &T)> {
+        GroupNumber::ALL.into_iter().zip(&self.0)
     }
 
-    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (ParameterGroup, &mut T)> {
-        ParameterGroup::ALL.into_iter().zip(&mut self.0)
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (GroupNumber, &mut T)> {
+        GroupNumber::ALL.into_iter().zip(&mut self.0)
     }
 }

@@ -1,23 +1,23 @@
 //! Parameter groups in two pages of NOR flash, safe against a power cut at any moment.
 //!
-//! The content of a [`ParameterGroup`] is a string of bytes with a layout version; the store does not interpret it. One
+//! A parameter group is a string of bytes with a layout version and a [`GroupNumber`]; the store does not interpret the bytes. One
 //! [`Store::save`] changes any number of groups at once: after a power cut at any flash operation, either all of them
 //! are old or all are new. Restoring the defaults (1011h) is such a change too. Data of an older layout is returned
 //! with its version, so that the caller can migrate or refuse it as a whole.
 //!
 //! ```
-//! use storage::{Change, ParameterGroup, Memory, Pages, Store, View};
+//! use storage::{Change, Memory, GroupNumber, Pages, Store, View};
 //!
 //! let pages = Pages::new(0, 16 * 1024);
 //! let flash = Memory(vec![0xFF; 32 * 1024]);
 //! let mut store = Store::prepare(View::open(flash, pages)?)?; // start-up: may erase
 //! let value = &[1, 2, 3];
 //! store.save(&[
-//!     Change::Set { group: ParameterGroup::Application, version: 1, value },
-//!     Change::Restore(ParameterGroup::Communication),
+//!     Change::Set { group: GroupNumber::Three, version: 1, value },
+//!     Change::Restore(GroupNumber::Two),
 //! ])?; // only programs words
 //! let mut buf = [0; 16];
-//! let loaded = store.load(ParameterGroup::Application, &mut buf)?.expect("it was saved");
+//! let loaded = store.load(GroupNumber::Three, &mut buf)?.expect("it was saved");
 //! assert_eq!((loaded.version, &buf[..loaded.len]), (1, &value[..]));
 //! # Ok::<(), storage::Error<embedded_storage::nor_flash::NorFlashErrorKind>>(())
 //! ```
@@ -106,6 +106,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
+// Nothing that comes from the bus or from the flash may panic or index out of range.
+#![cfg_attr(
+    not(any(test, feature = "mock")),
+    warn(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
 
 #[cfg(any(test, feature = "mock"))]
 extern crate std;
@@ -127,7 +132,7 @@ mod writer;
 
 pub use device::DeviceRecord;
 pub use error::Error;
-pub use group::{Change, Health, Loaded, ParameterGroup};
+pub use group::{Change, GroupNumber, Health, Loaded};
 pub use lookup::device_record;
 pub use memory::Memory;
 pub use page::Pages;

@@ -4,7 +4,6 @@ use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::device::DeviceRecord;
 use crate::format::WORD;
-use crate::group::ParameterGroup;
 use crate::page::{Page, Pages, StoredRecord};
 use crate::view::follows;
 
@@ -31,5 +30,5 @@ pub fn device_record<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Option<Dev
 fn newest<F: ReadNorFlash>(flash: &mut F, page: Page) -> Option<StoredRecord> {
     let places = (page.format.first()..page.size).step_by(WORD as usize);
     let records = places.filter_map(|at| page.record(flash, at, page.size).ok().flatten());
-    records.filter(|record| record.is_value_of(ParameterGroup::Device)).last()
+    records.filter(|record| record.is_value_of(DeviceRecord::NUMBER)).last()
 }

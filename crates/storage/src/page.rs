@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, ERASED, Format, KIND_RESTORED, KIND_VALUE, MARK, WORD, in_words};
-use crate::group::{GroupSet, ParameterGroup};
+use crate::group::{GroupNumber, GroupSet};
 
 /// The two pages of the store in the flash. Both have the same size and are adjacent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ pub(crate) struct Transaction {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredRecord {
     /// `None` for a group that this version does not know.
-    pub(crate) group: Option<ParameterGroup>,
+    pub(crate) group: Option<GroupNumber>,
     pub(crate) kind: u8,
     pub(crate) version: u16,
     pub(crate) generation: u16,
@@ -88,7 +88,7 @@ pub(crate) struct StoredRecord {
 
 impl StoredRecord {
     /// Whether the record gives the group a value that is not empty.
-    pub(crate) fn is_value_of(&self, group: ParameterGroup) -> bool {
+    pub(crate) fn is_value_of(&self, group: GroupNumber) -> bool {
         self.group == Some(group) && self.kind == KIND_VALUE && self.len > 0
     }
 }
@@ -162,15 +162,7 @@ impl Page {
         }
         let (version, generation) =
             (u16::from_le_bytes([low, high]), u16::from_le_bytes([generation_low, generation_high]));
-        Ok(Some(StoredRecord {
-            group: ParameterGroup::from_id(id),
-            kind,
-            version,
-            generation,
-            data,
-            len,
-            end,
-        }))
+        Ok(Some(StoredRecord { group: GroupNumber::from_id(id), kind, version, generation, data, len, end }))
     }
 
     /// The check word over the words between two places, for a record or transaction that begins at `at`.

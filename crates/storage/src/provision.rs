@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
 
 use crate::device::DeviceRecord;
 use crate::error::Error;
-use crate::group::{Change, Loaded, ParameterGroup};
+use crate::group::{Change, GroupNumber, Loaded};
 use crate::memory::Memory;
 use crate::page::Pages;
 use crate::store::Store;
@@ -24,7 +24,7 @@ pub fn provision<F: NorFlash>(
     }
     let mut store = Store::prepare(View::open(flash, pages)?)?;
     let value = &record.encode();
-    store.save(&[Change::Set { group: ParameterGroup::Device, version: DeviceRecord::VERSION, value }])
+    store.save(&[Change::Set { group: DeviceRecord::NUMBER, version: DeviceRecord::VERSION, value }])
 }
 
 /// Reads one group from a dump of the flash. For several groups or their health use a [`View`] of a [`Memory`].
@@ -34,7 +34,7 @@ pub fn provision<F: NorFlash>(
 pub fn read(
     flash: &[u8],
     pages: Pages,
-    group: ParameterGroup,
+    group: GroupNumber,
     buf: &mut [u8],
 ) -> Result<Option<Loaded>, Error<NorFlashErrorKind>> {
     View::open(Memory(flash), pages)?.load(group, buf)
@@ -54,9 +54,9 @@ mod tests {
         assert!(flash[..1024].iter().all(|&byte| byte == 0x55), "only the pages are touched");
         let mut view = View::open(Memory(flash.as_slice()), PAGES).unwrap();
         assert_eq!(view.device(), Ok(Some(record)));
-        let loaded = read(&flash, PAGES, ParameterGroup::Device, &mut [0; 16]).unwrap();
+        let loaded = read(&flash, PAGES, DeviceRecord::NUMBER, &mut [0; 16]).unwrap();
         assert_eq!(loaded, Some(Loaded { version: DeviceRecord::VERSION, len: DeviceRecord::LEN }));
-        assert_eq!(read(&flash, PAGES, ParameterGroup::Application, &mut []), Ok(None));
+        assert_eq!(read(&flash, PAGES, GroupNumber::Three, &mut []), Ok(None));
     }
 
     #[test]

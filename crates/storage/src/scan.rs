@@ -59,7 +59,7 @@ pub(crate) enum First {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scan {
     pub(crate) page: Page,
-    /// Number of this use of a page, counted over both pages; `None` if the page has no complete transaction.
+    /// GroupNumber of this use of a page, counted over both pages; `None` if the page has no complete transaction.
     pub(crate) generation: Option<u16>,
     pub(crate) first: First,
     /// The store has moved on to the other page.
@@ -237,7 +237,7 @@ mod tests {
 
     use super::*;
     use crate::format::{Check, Contents, ERASED, Format, WORD};
-    use crate::group::ParameterGroup;
+    use crate::group::GroupNumber;
     use crate::memory::Memory;
 
     const FORMAT: Format = Format::new(WORD).unwrap();
@@ -262,7 +262,7 @@ mod tests {
         Scan::of(&mut Memory(bytes.as_slice()), Page { start: 0, size: 64, format: FORMAT }).unwrap()
     }
 
-    fn head(group: ParameterGroup) -> u32 {
+    fn head(group: GroupNumber) -> u32 {
         u32::from_le_bytes([group.id(), KIND_VALUE, 9, 0])
     }
 
@@ -270,8 +270,8 @@ mod tests {
     fn a_record_ends_where_its_transaction_ends_at_the_latest() {
         // With five to eight bytes, the check word is where the test puts it.
         for (len, fits) in [(5, true), (8, true), (9, false), (0xFFFF, false)] {
-            let scan = scan(&[head(ParameterGroup::Device), len, 0x1111, 0x2222]);
-            let content = scan.groups.get(ParameterGroup::Device).content;
+            let scan = scan(&[head(GroupNumber::One), len, 0x1111, 0x2222]);
+            let content = scan.groups.get(GroupNumber::One).content;
             assert_eq!(matches!(content, Content::Value(slot) if slot.len == len), fits, "{len} bytes");
             assert!(scan.tidy);
         }

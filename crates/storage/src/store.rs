@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::NorFlash;
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::{CLEAN, Format, MARK};
-use crate::group::{Change, Health, Loaded, ParameterGroup, PerGroup};
+use crate::group::{Change, GroupNumber, Health, Loaded, PerGroup};
 use crate::page::Page;
 #[cfg(doc)]
 use crate::page::Pages;
@@ -91,7 +91,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Removes values that are already stored: a master that saves after every start does not wear the flash.
     fn drop_unchanged(&mut self, records: &mut Records<'_>) -> Result<(), F::Error> {
-        for group in ParameterGroup::ALL {
+        for group in GroupNumber::ALL {
             let is_same = match (records.get(group), self.current_content(group)) {
                 (Some(Record::Set { version, value }), Content::Value(slot)) if slot.version == *version => {
                     self.view.holds(&slot, value)?
@@ -108,7 +108,7 @@ impl<F: NorFlash> Store<F> {
 
     /// The content of the group that the next start would read. Values in a damaged page do not count, because the page
     /// will be rewritten.
-    fn current_content(&self, group: ParameterGroup) -> Content {
+    fn current_content(&self, group: GroupNumber) -> Content {
         let entry = self.view.state.groups.get(group);
         if entry.suspect { Content::Unnamed } else { entry.content }
     }
@@ -117,7 +117,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Errors of [`View::load`].
-    pub fn load(&mut self, group: ParameterGroup, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    pub fn load(&mut self, group: GroupNumber, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         self.view.load(group, buf)
     }
 
@@ -131,7 +131,7 @@ impl<F: NorFlash> Store<F> {
 
     /// The [`View::health`] at the opening of the view, even after `prepare` has repaired the store.
     #[must_use]
-    pub fn health(&self, group: ParameterGroup) -> Health {
+    pub fn health(&self, group: GroupNumber) -> Health {
         self.view.health(group)
     }
 
@@ -227,6 +227,6 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
-fn last_change<'a>(changes: &[Change<'a>], group: ParameterGroup) -> Option<Record<'a>> {
+fn last_change<'a>(changes: &[Change<'a>], group: GroupNumber) -> Option<Record<'a>> {
     changes.iter().rev().find(|change| change.group() == group).map(|&change| Record::from(change))
 }

@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::WORD;
-use crate::group::{Health, Loaded, ParameterGroup, PerGroup};
+use crate::group::{GroupNumber, Health, Loaded, PerGroup};
 use crate::page::Pages;
 use crate::scan::{Content, Entry, First, Scan, Slot};
 
@@ -46,7 +46,7 @@ impl<F: ReadNorFlash> View<F> {
     /// # Errors
     /// [`Error::BufferTooSmall`]; [`Error::Corrupt`] if the flash has changed since it was opened; [`Error::Flash`].
     /// After an error the content of `buf` is meaningless.
-    pub fn load(&mut self, group: ParameterGroup, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    pub fn load(&mut self, group: GroupNumber, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         let Content::Value(slot) = self.state.groups.get(group).content else { return Ok(None) };
         let len = slot.len as usize;
         let target = buf.get_mut(..len).ok_or(Error::BufferTooSmall)?;
@@ -61,7 +61,7 @@ impl<F: ReadNorFlash> View<F> {
     /// Errors of [`View::load`].
     pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
         let mut buf = [0; DeviceRecord::ROOM];
-        match self.load(ParameterGroup::Device, &mut buf) {
+        match self.load(DeviceRecord::NUMBER, &mut buf) {
             Ok(Some(loaded)) => {
                 Ok(buf.get(..loaded.len).and_then(|value| DeviceRecord::decode(loaded.version, value)))
             }
@@ -72,7 +72,7 @@ impl<F: ReadNorFlash> View<F> {
 
     /// Whether the newest values of a group could be read when the store was opened.
     #[must_use]
-    pub fn health(&self, group: ParameterGroup) -> Health {
+    pub fn health(&self, group: GroupNumber) -> Health {
         *self.health.get(group)
     }
 
@@ -147,7 +147,7 @@ pub(crate) fn follows(x: u16, y: u16) -> bool {
 
 /// The state of a group. If the page in use is marked as left, its successor cannot be read. If no page is in use,
 /// damage in either page may be the rest of a value.
-fn merge(current: &Scan, other: &Scan, group: ParameterGroup) -> Entry {
+fn merge(current: &Scan, other: &Scan, group: GroupNumber) -> Entry {
     let (mine, theirs) = (current.groups.get(group), other.groups.get(group));
     let successor_lost = current.left || (current.generation.is_none() && theirs.suspect);
     Entry { suspect: mine.suspect || successor_lost, ..*mine }

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words};
-use crate::group::{Change, GroupSet, ParameterGroup, PerGroup};
+use crate::group::{Change, GroupNumber, GroupSet, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
 
@@ -105,7 +105,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
 
     fn record(
         &mut self,
-        group: ParameterGroup,
+        group: GroupNumber,
         record: &Record<'_>,
         generation: u16,
     ) -> Result<(), Error<F::Error>> {

@@ -59,3 +59,34 @@ impl Frame {
         if self.remote { &[] } else { &self.data[..usize::from(self.len)] }
     }
 }
+
+/// For codecs and drivers that know embedded-can only.
+impl embedded_can::Frame for Frame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Frame> {
+        Frame::data(id, data)
+    }
+
+    fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Frame> {
+        Frame::remote(id, u8::try_from(dlc).ok()?)
+    }
+
+    fn is_extended(&self) -> bool {
+        matches!(self.id, Id::Extended(_))
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.remote
+    }
+
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn dlc(&self) -> usize {
+        self.len.into()
+    }
+
+    fn data(&self) -> &[u8] {
+        self.bytes()
+    }
+}

@@ -3,16 +3,11 @@
 
 use arbitrary::{Arbitrary, Unstructured};
 use storage::mock::{MockFlash, PowerCut, Weak};
-use storage::{Change, Error, Health, Loaded, Pages, ParameterGroup, Store, View};
+use storage::{Change, Error, GroupNumber, Health, Loaded, Pages, Store, View};
 
 const PAGE: usize = 512;
 const PAGES: Pages = Pages::new(0, 512);
-const GROUPS: [ParameterGroup; 4] = [
-    ParameterGroup::Communication,
-    ParameterGroup::Application,
-    ParameterGroup::Calibration,
-    ParameterGroup::Device,
-];
+const GROUPS: [GroupNumber; 4] = [GroupNumber::Two, GroupNumber::Three, GroupNumber::Four, GroupNumber::One];
 /// Longest value of a save.
 const LONGEST: usize = 64;
 
@@ -112,7 +107,7 @@ impl Bench {
     }
 
     /// Saves after a start, because only a start frees a page, and the pages are small.
-    fn save(&mut self, group: ParameterGroup, change: &Change<'_>, value: Read) {
+    fn save(&mut self, group: GroupNumber, change: &Change<'_>, value: Read) {
         self.restart();
         let Ok(view) = View::open(&mut self.flash, PAGES) else { return };
         let result = Store::prepare(view).and_then(|mut store| store.save(std::slice::from_ref(change)));

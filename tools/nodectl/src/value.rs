@@ -159,10 +159,7 @@ fn integer(text: &str, low: i128, high: i128) -> Option<Value> {
 
 /// Pairs of hexadecimal digits, with or without spaces.
 pub(crate) fn hex_bytes(text: &str) -> Option<Vec<u8>> {
-    let digits: String = text.split_ascii_whitespace().collect();
-    let is_plain = digits.len().is_multiple_of(2) && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let pair = |number: usize| u8::from_str_radix(&digits[2 * number..2 * number + 2], 16).ok();
-    is_plain.then(|| (0..digits.len() / 2).map(pair).collect())?
+    hex::decode(text.split_ascii_whitespace().collect::<String>()).ok()
 }
 
 fn expected(data_type: DataType) -> String {

@@ -1,4 +1,5 @@
 //! Checks of a table of rows at compile time, on which the code at run time relies. The panics here are compile errors.
+#![allow(clippy::indexing_slicing, clippy::panic, reason = "evaluated by the compiler")]
 
 use super::compile::{effective_limits, event_timer};
 use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};

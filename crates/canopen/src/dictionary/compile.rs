@@ -1,4 +1,5 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
+#![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use super::filling::{Filling, attributes, is_same, larger};
 use super::{Access, Dictionary, Object, Tables, Type, check};

@@ -1,5 +1,6 @@
 //! The filling of the run-time tables. What is in them already is not put there again: places of the same shape, equal
 //! attributes, and default values that follow each other somewhere as they are needed.
+#![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::Attributes;

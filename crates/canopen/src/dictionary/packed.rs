@@ -34,6 +34,7 @@ impl core::fmt::Display for BufferFull {
 impl core::error::Error for BufferFull {}
 
 /// The most bytes that the group of a table takes when packed.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 #[must_use]
 pub const fn packed_size(rows: &[Object], group: Group) -> usize {
     let (mut total, mut i) = (0, 0);

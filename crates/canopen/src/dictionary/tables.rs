@@ -185,6 +185,7 @@ impl Dictionary {
     ///
     /// # Panics
     /// During compilation, when there is no such entry.
+    #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
     #[must_use]
     pub const fn field(&self, index: u16, sub: u8) -> Field {
         let mut i = 0;

@@ -138,6 +138,7 @@ impl Light {
     }
 
     /// Period of a flashing lamp in milliseconds.
+    #[allow(clippy::indexing_slicing, reason = "three bits index eight periods")]
     #[must_use]
     pub const fn period(self) -> Option<u32> {
         const PERIODS: [u32; 8] = [100, 133, 200, 500, 666, 1000, 2000, 4000];

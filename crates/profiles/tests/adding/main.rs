@@ -2,6 +2,7 @@
 
 mod switches;
 
+use canopen::ErrorClass;
 use canopen::dictionary::Group;
 use profiles::board::{Inputs, PowerOn, RawEncoder, RawSample, Retained};
 use profiles::{encoder, personalities};
@@ -88,6 +89,19 @@ fn it_decides_on_its_own_objects_and_lights_its_lamps() {
     node.sample([true, true]);
     assert_eq!((node.read(0x2400, 1), node.read(0x2400, 2)), (0, 0));
     node.write(0x6200, 1, &[0b10]).unwrap();
+    assert_eq!(node.profile.outputs(&node.image).digital, [false, true]);
+}
+
+#[test]
+fn it_is_told_of_a_sync_and_of_an_error() {
+    let mut node = Node::new();
+    node.sample([true, true]);
+    assert_eq!(node.read(0x2403, 0), 0);
+    node.profile.synchronised(None, &mut node.image);
+    assert_eq!(node.read(0x2403, 0), 3);
+    node.write(0x6200, 1, &[0b11]).unwrap();
+    node.write(0x6206, 1, &[0b01]).unwrap();
+    node.profile.error(ErrorClass::COMMUNICATION, &mut node.image);
     assert_eq!(node.profile.outputs(&node.image).digital, [false, true]);
 }
 

@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use crate::model::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use storage::mock::{MockFlash, PowerCut};
-use storage::{Error, Health, Loaded, Pages, ParameterGroup, Store, View};
+use storage::{Error, GroupNumber, Health, Loaded, Pages, Store, View};
 
 const PAGES: Pages = Pages::new(0, 512);
 type Flash = MockFlash<256>;
@@ -34,18 +34,13 @@ impl Device {
 
     /// All saves are in one page, and the other page is clean.
     fn on_one_page() -> Device {
-        use ParameterGroup::{Application, Calibration, Communication, Device as Identity};
+        use GroupNumber::{Four, One, Three, Two};
         Device::new(vec![
-            vec![
-                set(Identity, 1, 4),
-                set(Communication, 2, 20),
-                set(Application, 3, 30),
-                set(Calibration, 4, 6),
-            ],
-            vec![set(Communication, 5, 21)],
-            vec![set(Application, 6, 31), restore(Calibration)],
-            vec![set(Identity, 7, 4), set(Application, 8, 0)],
-            vec![set(Application, 9, 33)],
+            vec![set(One, 1, 4), set(Two, 2, 20), set(Three, 3, 30), set(Four, 4, 6)],
+            vec![set(Two, 5, 21)],
+            vec![set(Three, 6, 31), restore(Four)],
+            vec![set(One, 7, 4), set(Three, 8, 0)],
+            vec![set(Three, 9, 33)],
         ])
     }
 
@@ -53,7 +48,7 @@ impl Device {
     /// yet.
     fn just_moved() -> Device {
         let Device { mut saves, .. } = Device::on_one_page();
-        saves.extend((10..17).map(|version| vec![set(ParameterGroup::Application, version, 34)]));
+        saves.extend((10..17).map(|version| vec![set(GroupNumber::Three, version, 34)]));
         let device = Device::new(saves);
         assert!(device.flash.bytes()[512..].iter().any(|&byte| byte != 0xFF));
         device
@@ -75,14 +70,14 @@ impl Device {
         let mut flash = self.flash.clone();
         damage(&mut flash);
         let (model, _) = self.check_read(&mut flash, honest);
-        let changes = vec![set(ParameterGroup::Device, 77, 4)];
+        let changes = vec![set(GroupNumber::One, 77, 4)];
         start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
         assert_eq!(read_good(&mut flash, PAGES), after(&model, &changes), "mended");
     }
 
     fn check_read(&self, flash: &mut Flash, honest: bool) -> (Model, [Health; 4]) {
         let (model, health) = read(flash, PAGES);
-        for (value, group) in model.iter().zip(ParameterGroup::ALL) {
+        for (value, group) in model.iter().zip(GroupNumber::ALL) {
             let was_saved =
                 self.saves.iter().flatten().any(|(saved, state)| *saved == group && state == value);
             assert!(value.is_none() || was_saved, "{value:?} was never saved");
@@ -127,7 +122,7 @@ fn a_flipped_bit_in_the_newest_save_falls_back_to_the_one_before() {
 }
 
 /// The place of a group's saved value in the page, found by its bytes.
-fn place(flash: &Flash, (_, value): &(ParameterGroup, crate::model::Value)) -> usize {
+fn place(flash: &Flash, (_, value): &(GroupNumber, crate::model::Value)) -> usize {
     let (_, value) = value.as_ref().unwrap();
     let bytes = flash.bytes();
     let mut found = (0..bytes.len()).filter(|&at| bytes[at..].starts_with(value));
@@ -135,16 +130,16 @@ fn place(flash: &Flash, (_, value): &(ParameterGroup, crate::model::Value)) -> u
 }
 
 /// The expected health of all groups when a record of one group is damaged.
-fn only(group: ParameterGroup, health: Health) -> [Health; 4] {
-    ParameterGroup::ALL.map(|other| if other == group { health } else { Health::Good })
+fn only(group: GroupNumber, health: Health) -> [Health; 4] {
+    GroupNumber::ALL.map(|other| if other == group { health } else { Health::Good })
 }
 
 /// Every group and every kind of damage: the newest of several records, an older record, and the only record. The other
 /// groups are saved together with the group, before it and after it.
 #[test]
 fn only_the_group_whose_record_is_damaged_is_affected() {
-    for group in ParameterGroup::ALL {
-        let all = |version| ParameterGroup::ALL.map(|group| set(group, version + group as u16, 12)).to_vec();
+    for group in GroupNumber::ALL {
+        let all = |version| GroupNumber::ALL.map(|group| set(group, version + group as u16, 12)).to_vec();
         for (saves, damaged, expected) in [
             (vec![all(10), vec![set(group, 20, 12)]], set(group, 20, 12), Health::FellBack),
             (vec![all(10), all(20)], set(group, 20 + group as u16, 12), Health::FellBack),
@@ -164,7 +159,7 @@ fn only_the_group_whose_record_is_damaged_is_affected() {
                     let (model, health) = read(&mut flash, PAGES);
                     assert_eq!(health, only(group, expected), "{group:?}, byte {byte}, bit {bit}");
                     for (other, (value, newest)) in
-                        ParameterGroup::ALL.into_iter().zip(model.iter().zip(&newest))
+                        GroupNumber::ALL.into_iter().zip(model.iter().zip(&newest))
                     {
                         let is_newest = other != group || expected == Health::Good;
                         assert_eq!(
@@ -251,7 +246,7 @@ fn foreign_pages_are_reported_and_replaced() {
         let mut flash = Flash::new(1024, 1);
         (0..1024).for_each(|at| flash.disturb(at, |_| content[at]));
         assert_eq!(read(&mut flash, PAGES), (EMPTY, [expected; 4]));
-        let changes = vec![set(ParameterGroup::Device, 1, 4)];
+        let changes = vec![set(GroupNumber::One, 1, 4)];
         start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
         assert_eq!(read_good(&mut flash, PAGES), after(&EMPTY, &changes));
     }
@@ -259,10 +254,10 @@ fn foreign_pages_are_reported_and_replaced() {
 
 #[test]
 fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
-    let first = vec![set(ParameterGroup::Device, 1, 4)];
+    let first = vec![set(GroupNumber::One, 1, 4)];
     let page = Device::new(vec![first.clone()]).flash.bytes();
-    let copy = vec![(ParameterGroup::Application, Some((3, page[8..100].to_vec())))];
-    let device = Device::new(vec![first, vec![set(ParameterGroup::Device, 2, 4)], copy]);
+    let copy = vec![(GroupNumber::Three, Some((3, page[8..100].to_vec())))];
+    let device = Device::new(vec![first, vec![set(GroupNumber::One, 2, 4)], copy]);
     let before = replay(&mut device.saves[..2].iter());
     // The save with the copy follows one that names every group and one with a single record. With its contents and the
     // head of its record damaged, the search for the next record enters the value.
@@ -297,7 +292,7 @@ fn what_the_start_has_found_is_told_after_it_was_mended_too() {
     let mut flash = device.flash.clone();
     flash.disturb(24, |byte| byte ^ 1);
     let store = start(&mut flash, PAGES).unwrap();
-    let health = ParameterGroup::ALL.map(|group| store.health(group));
+    let health = GroupNumber::ALL.map(|group| store.health(group));
     assert_eq!(health, [Health::Lost, Health::Good, Health::Good, Health::Good]);
     assert_eq!(read(&mut flash, PAGES).1, [Health::Good; 4], "the next start finds nothing");
 }
@@ -349,18 +344,13 @@ impl NorFlash for Shared<'_> {
 fn a_value_that_decays_while_the_store_runs_is_neither_read_nor_moved() {
     let flash = RefCell::new(Flash::new(1024, 1));
     let mut store = View::open(Shared(&flash), PAGES).and_then(Store::prepare).unwrap();
-    store
-        .save(&as_changes(&vec![
-            set(ParameterGroup::Device, 1, 4),
-            set(ParameterGroup::Communication, 2, 300),
-        ]))
-        .unwrap();
+    store.save(&as_changes(&vec![set(GroupNumber::One, 1, 4), set(GroupNumber::Two, 2, 300)])).unwrap();
     flash.borrow_mut().disturb(100, |byte| byte ^ 4);
-    assert_eq!(store.load(ParameterGroup::Communication, &mut [0; 300]), Err(Error::Corrupt));
-    assert_eq!(store.load(ParameterGroup::Device, &mut [0; 4]), Ok(Some(Loaded { version: 1, len: 4 })));
+    assert_eq!(store.load(GroupNumber::Two, &mut [0; 300]), Err(Error::Corrupt));
+    assert_eq!(store.load(GroupNumber::One, &mut [0; 4]), Ok(Some(Loaded { version: 1, len: 4 })));
     let before = flash.borrow().programmed();
     // The save does not fit the page any more, so it would move the decayed groups too.
-    let moving = store.save(&as_changes(&vec![set(ParameterGroup::Application, 3, 124)]));
+    let moving = store.save(&as_changes(&vec![set(GroupNumber::Three, 3, 124)]));
     assert_eq!(moving, Err(Error::Corrupt));
     assert_eq!(flash.borrow().programmed(), before);
 }

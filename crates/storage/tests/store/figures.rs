@@ -2,7 +2,7 @@
 
 use crate::model::{Changes, as_changes, set, start};
 use storage::mock::MockFlash;
-use storage::{MAX_VALUE, Pages, ParameterGroup};
+use storage::{GroupNumber, MAX_VALUE, Pages};
 
 const PAGE: usize = 16 * 1024;
 const PAGES: Pages = Pages::new(0, 16 * 1024);
@@ -16,14 +16,14 @@ fn blank() -> MockFlash<PAGE> {
 }
 
 /// Groups and sizes of the values that are saved at once.
-type Sizes = [(ParameterGroup, usize)];
+type Sizes = [(GroupNumber, usize)];
 
 /// The changes of save `number`: every value differs from that of the save before.
 fn changes(sizes: &Sizes, number: usize) -> Changes {
     sizes.iter().map(|&(group, len)| set(group, number as u16, len)).collect()
 }
 
-/// Number of saves that fit between two starts, if both pages are empty at the first.
+/// GroupNumber of saves that fit between two starts, if both pages are empty at the first.
 fn saves_without_restart(sizes: &Sizes) -> usize {
     let mut flash = blank();
     let mut store = start(&mut flash, PAGES).unwrap();
@@ -48,12 +48,12 @@ fn words_of_saves(sizes: &Sizes, count: usize) -> Vec<u32> {
 
 #[test]
 fn saves_until_a_restart_and_until_worn_out() {
-    let largest = ParameterGroup::ALL.map(|group| (group, MAX_VALUE));
+    let largest = GroupNumber::ALL.map(|group| (group, MAX_VALUE));
     let sets: [(&str, &Sizes, usize); 3] = [
-        ("application group, 212 B", &[(ParameterGroup::Application, 212)], 136),
+        ("application group, 212 B", &[(GroupNumber::Three, 212)], 136),
         (
             "communication and application groups, 1405 B",
-            &[(ParameterGroup::Communication, 1193), (ParameterGroup::Application, 212)],
+            &[(GroupNumber::Two, 1193), (GroupNumber::Three, 212)],
             22,
         ),
         ("all four groups at their most, 8192 B", &largest, 2),

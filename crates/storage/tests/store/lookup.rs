@@ -2,7 +2,7 @@
 
 use crate::model::{as_changes, noise, set, start};
 use storage::mock::{MockFlash, Weak};
-use storage::{Change, DeviceRecord, Pages, ParameterGroup, device_record};
+use storage::{Change, DeviceRecord, GroupNumber, Pages, device_record};
 
 const PAGES: Pages = Pages::new(0, 512);
 type Flash = MockFlash<512, 4>;
@@ -15,7 +15,7 @@ fn save(flash: &mut Flash, node_id: u8) -> bool {
     let value = record(node_id).encode();
     let Ok(mut store) = start(flash, PAGES) else { return false };
     store
-        .save(&[Change::Set { group: ParameterGroup::Device, version: DeviceRecord::VERSION, value: &value }])
+        .save(&[Change::Set { group: GroupNumber::One, version: DeviceRecord::VERSION, value: &value }])
         .is_ok()
 }
 
@@ -23,10 +23,7 @@ fn save(flash: &mut Flash, node_id: u8) -> bool {
 fn there_is_none_where_none_was_saved() {
     let mut flash = Flash::new(1024, 0);
     assert_eq!(device_record(&mut flash, PAGES), None);
-    start(&mut flash, PAGES)
-        .unwrap()
-        .save(&as_changes(&vec![set(ParameterGroup::Application, 1, 8)]))
-        .unwrap();
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&vec![set(GroupNumber::Three, 1, 8)])).unwrap();
     assert_eq!(device_record(&mut flash, PAGES), None);
     assert_eq!(device_record(&mut flash, Pages::new(0, 4096)), None, "pages beyond the flash");
 }
@@ -38,7 +35,7 @@ fn it_is_the_one_that_was_saved_last() {
     for round in 1..=120 {
         assert!(save(&mut flash, round));
         let value = noise(u64::from(round), 40);
-        let change = Change::Set { group: ParameterGroup::Application, version: 1, value: &value };
+        let change = Change::Set { group: GroupNumber::Three, version: 1, value: &value };
         start(&mut flash, PAGES).unwrap().save(&[change]).unwrap();
         assert_eq!(device_record(&mut flash, PAGES), Some(record(round)));
     }

@@ -1,16 +1,16 @@
 //! The plain model of the store, and functions that run both.
 
 use storage::mock::{MockFlash, PowerCut};
-use storage::{Change, Error, Health, MAX_VALUE, Pages, ParameterGroup, Store, View};
+use storage::{Change, Error, GroupNumber, Health, MAX_VALUE, Pages, Store, View};
 
 /// A version and a value, or nothing.
 pub(crate) type Value = Option<(u16, Vec<u8>)>;
 
-/// The values that should be stored, in the order of [`ParameterGroup::ALL`].
+/// The values that should be stored, in the order of [`GroupNumber::ALL`].
 pub(crate) type Model = [Value; 4];
 
 /// The changes of a save.
-pub(crate) type Changes = Vec<(ParameterGroup, Value)>;
+pub(crate) type Changes = Vec<(GroupNumber, Value)>;
 
 /// Nothing stored.
 pub(crate) const EMPTY: Model = [None, None, None, None];
@@ -25,12 +25,12 @@ pub(crate) enum Step {
 }
 
 /// Sets a group to `len` bytes of noise.
-pub(crate) fn set(group: ParameterGroup, version: u16, len: usize) -> (ParameterGroup, Value) {
+pub(crate) fn set(group: GroupNumber, version: u16, len: usize) -> (GroupNumber, Value) {
     (group, Some((version, noise(u64::from(version), len))))
 }
 
 /// Restores the defaults of a group.
-pub(crate) fn restore(group: ParameterGroup) -> (ParameterGroup, Value) {
+pub(crate) fn restore(group: GroupNumber) -> (GroupNumber, Value) {
     (group, None)
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
 pub(crate) fn after(model: &Model, changes: &Changes) -> Model {
     let mut model = model.clone();
     for (group, value) in changes {
-        let place = ParameterGroup::ALL.iter().position(|g| g == group).unwrap();
+        let place = GroupNumber::ALL.iter().position(|g| g == group).unwrap();
         model[place].clone_from(value);
     }
     model
@@ -55,7 +55,7 @@ pub(crate) fn as_changes(changes: &Changes) -> Vec<Change<'_>> {
     changes.iter().map(as_change).collect()
 }
 
-fn as_change((group, value): &(ParameterGroup, Value)) -> Change<'_> {
+fn as_change((group, value): &(GroupNumber, Value)) -> Change<'_> {
     match value {
         Some((version, value)) => Change::Set { group: *group, version: *version, value },
         None => Change::Restore(*group),
@@ -68,12 +68,12 @@ pub(crate) fn read<const ERASE: usize, const WORD: usize>(
     pages: Pages,
 ) -> (Model, [Health; 4]) {
     let mut view = View::open(flash, pages).unwrap();
-    let value = ParameterGroup::ALL.map(|group| {
+    let value = GroupNumber::ALL.map(|group| {
         let mut buf = [0; MAX_VALUE];
         let loaded = view.load(group, &mut buf).unwrap()?;
         Some((loaded.version, buf[..loaded.len].to_vec()))
     });
-    (value, ParameterGroup::ALL.map(|group| view.health(group)))
+    (value, GroupNumber::ALL.map(|group| view.health(group)))
 }
 
 /// The stored values, in a flash in which nothing may be doubtful.

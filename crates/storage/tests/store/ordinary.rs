@@ -3,12 +3,12 @@
 use crate::model::{EMPTY, after, as_changes, noise, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use storage::mock::MockFlash;
-use storage::{Change, DeviceRecord, Error, Loaded, MAX_VALUE, Memory, Pages, ParameterGroup, Store, View};
+use storage::{Change, DeviceRecord, Error, GroupNumber, Loaded, MAX_VALUE, Memory, Pages, Store, View};
 
 const PAGES: Pages = Pages::new(0, 512);
 
 fn application(value: &[u8]) -> [Change<'_>; 1] {
-    [Change::Set { group: ParameterGroup::Application, version: 1, value }]
+    [Change::Set { group: GroupNumber::Three, version: 1, value }]
 }
 
 #[test]
@@ -16,25 +16,25 @@ fn a_value_comes_back_with_its_version_and_an_empty_value_is_not_none() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let mut store = start(&mut flash, PAGES).unwrap();
     let value = [1, 2, 3, 4, 5];
-    let group = ParameterGroup::Communication;
+    let group = GroupNumber::Two;
     store.save(&[Change::Set { group, version: 0xABCD, value: &value }]).unwrap();
     store.save(&application(&[])).unwrap();
     let mut buf = [0; 8];
     assert_eq!(store.load(group, &mut buf), Ok(Some(Loaded { version: 0xABCD, len: 5 })));
     assert_eq!(buf, [1, 2, 3, 4, 5, 0, 0, 0]);
     assert_eq!(store.load(group, &mut buf[..4]), Err(Error::BufferTooSmall));
-    assert_eq!(store.load(ParameterGroup::Application, &mut []), Ok(Some(Loaded { version: 1, len: 0 })));
-    assert_eq!(store.load(ParameterGroup::Calibration, &mut []), Ok(None));
+    assert_eq!(store.load(GroupNumber::Three, &mut []), Ok(Some(Loaded { version: 1, len: 0 })));
+    assert_eq!(store.load(GroupNumber::Four, &mut []), Ok(None));
 }
 
 #[test]
 fn of_several_changes_to_one_group_the_last_counts() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let changes = vec![
-        set(ParameterGroup::Device, 1, 4),
-        set(ParameterGroup::Application, 2, 9),
-        restore(ParameterGroup::Device),
-        set(ParameterGroup::Device, 3, 5),
+        set(GroupNumber::One, 1, 4),
+        set(GroupNumber::Three, 2, 9),
+        restore(GroupNumber::One),
+        set(GroupNumber::One, 3, 5),
     ];
     start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
     assert_eq!(read_good(&mut flash, PAGES), after(&EMPTY, &changes));
@@ -50,7 +50,7 @@ fn a_device_record_of_another_layout_is_none() {
         (DeviceRecord::VERSION + 1, record.encode().to_vec(), None),
         (DeviceRecord::VERSION, vec![7; 40], None),
     ] {
-        store.save(&[Change::Set { group: ParameterGroup::Device, version, value: &value }]).unwrap();
+        store.save(&[Change::Set { group: GroupNumber::One, version, value: &value }]).unwrap();
         assert_eq!(store.device(), Ok(expected));
     }
 }
@@ -66,7 +66,7 @@ fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
         }
         assert_eq!(store.save(&application(&[0])), Err(Error::RestartNeeded));
         let mut buf = [0; 2];
-        store.load(ParameterGroup::Application, &mut buf).unwrap();
+        store.load(GroupNumber::Three, &mut buf).unwrap();
         assert_eq!(buf, [round, saves - 1]);
         assert!(saves >= 12, "at least a page's worth of saves after each start: {saves}");
     }
@@ -80,23 +80,20 @@ fn what_could_never_be_moved_is_refused_while_there_is_room() {
     let mut store = start(&mut flash, PAGES).unwrap();
     store.save(&application(&noise(1, 200))).unwrap();
     let value = noise(2, 241);
-    let too_long = [Change::Set { group: ParameterGroup::Communication, version: 1, value: &value }];
+    let too_long = [Change::Set { group: GroupNumber::Two, version: 1, value: &value }];
     assert_eq!(store.save(&too_long), Err(Error::TooLong));
     let value = noise(2, 240);
-    let fits = [Change::Set { group: ParameterGroup::Communication, version: 1, value: &value }];
+    let fits = [Change::Set { group: GroupNumber::Two, version: 1, value: &value }];
     assert_eq!(store.save(&fits), Ok(()));
     assert_eq!(store.save(&application(&vec![0; MAX_VALUE + 1])), Err(Error::TooLong));
-    assert_eq!(
-        store.load(ParameterGroup::Application, &mut [0; 200]),
-        Ok(Some(Loaded { version: 1, len: 200 }))
-    );
+    assert_eq!(store.load(GroupNumber::Three, &mut [0; 200]), Ok(Some(Loaded { version: 1, len: 200 })));
 }
 
 #[test]
 fn four_values_of_the_greatest_length_fit_the_pages_of_the_chip() {
     let pages = Pages::new(0, 16 * 1024);
     let mut flash = MockFlash::<16384, 4>::new(32 * 1024, 0);
-    let changes: Vec<_> = ParameterGroup::ALL.iter().map(|&group| set(group, 1, MAX_VALUE)).collect();
+    let changes: Vec<_> = GroupNumber::ALL.iter().map(|&group| set(group, 1, MAX_VALUE)).collect();
     for _ in 0..3 {
         start(&mut flash, pages).unwrap().save(&as_changes(&changes)).unwrap();
     }
@@ -123,7 +120,7 @@ fn a_flash_that_programs_other_words_than_the_pages_say_is_refused() {
         let pages = PAGES.with_words(bytes);
         start(&mut flash, pages).unwrap().save(&application(&[1, 2, 3])).unwrap();
         let mut buf = [0; 3];
-        let loaded = start(&mut flash, pages).unwrap().load(ParameterGroup::Application, &mut buf);
+        let loaded = start(&mut flash, pages).unwrap().load(GroupNumber::Three, &mut buf);
         assert_eq!((loaded, buf), (Ok(Some(Loaded { version: 1, len: 3 })), [1, 2, 3]));
         flash = MockFlash::new(1024, 0);
     }
@@ -139,7 +136,7 @@ fn the_generation_of_the_pages_may_wrap() {
         store.save(&application(&count.to_le_bytes())).unwrap();
         if count % 100 == 0 || count > 65_500 {
             let mut buf = [0; 4];
-            View::open(&mut flash, pages).unwrap().load(ParameterGroup::Application, &mut buf).unwrap();
+            View::open(&mut flash, pages).unwrap().load(GroupNumber::Three, &mut buf).unwrap();
             assert_eq!(u32::from_le_bytes(buf), count);
         }
     }
@@ -201,7 +198,7 @@ fn where_no_page_is_in_use_a_save_that_failed_succeeds_on_the_other_one() {
             failed += 1;
             store.save(&application(&[4])).unwrap();
             let mut buf = [0; 1];
-            store.load(ParameterGroup::Application, &mut buf).unwrap();
+            store.load(GroupNumber::Three, &mut buf).unwrap();
             assert_eq!(buf, [4]);
         }
     }
@@ -215,7 +212,7 @@ fn a_worn_out_word_fails_the_save_and_nothing_else() {
         for value in 1_u8..20 {
             let saved = store.save(&application(&[value * 2]));
             let mut buf = [0; 1];
-            store.load(ParameterGroup::Application, &mut buf).unwrap();
+            store.load(GroupNumber::Three, &mut buf).unwrap();
             match saved {
                 Ok(()) => assert_eq!(buf, [value * 2]),
                 Err(Error::Corrupt) => assert!(buf == [last] || buf == [value * 2], "old or new"),
@@ -230,17 +227,13 @@ fn a_worn_out_word_fails_the_save_and_nothing_else() {
 #[test]
 fn what_is_stored_already_wears_out_nothing() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
-    let both = vec![
-        set(ParameterGroup::Communication, 1, 7),
-        restore(ParameterGroup::Application),
-        set(ParameterGroup::Device, 1, 4),
-    ];
+    let both = vec![set(GroupNumber::Two, 1, 7), restore(GroupNumber::Three), set(GroupNumber::One, 1, 4)];
     start(&mut flash, PAGES).unwrap().save(&as_changes(&both)).unwrap();
     let programmed = flash.programmed();
     start(&mut flash, PAGES).unwrap().save(&as_changes(&both)).unwrap();
     assert_eq!(flash.programmed(), programmed);
 
-    let one = vec![set(ParameterGroup::Communication, 1, 7), set(ParameterGroup::Device, 1, 5)];
+    let one = vec![set(GroupNumber::Two, 1, 7), set(GroupNumber::One, 1, 5)];
     start(&mut flash, PAGES).unwrap().save(&as_changes(&one)).unwrap();
     // Begin, contents; the record's head, two words of its value, its check; commit, closed.
     assert_eq!(flash.programmed() - programmed, 2 + 2 + 3 + 2, "only the group that differs");

@@ -5,7 +5,7 @@ use crate::model::{
     EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start,
 };
 use storage::mock::{MockFlash, Weak};
-use storage::{Pages, ParameterGroup};
+use storage::{GroupNumber, Pages};
 
 /// Small pages make page moves frequent. With two erase units per page, an erase can be cut between the units.
 const fn pages(word: usize) -> Pages {
@@ -21,24 +21,24 @@ fn flash<const WORD: usize>(seed: u64) -> Flash<WORD> {
 
 /// Saves of one and of several groups, of empty values, restores, both pages filled, and restarts that erase.
 fn scenario() -> Vec<Step> {
-    use ParameterGroup::{Application, Calibration, Communication, Device};
+    use GroupNumber::{Four, One, Three, Two};
     let save = |changes: &[_]| Step::Save(changes.to_vec());
     vec![
-        save(&[set(Device, 1, 4)]),
-        save(&[set(Communication, 2, 17), set(Application, 3, 30)]),
-        save(&[set(Application, 4, 31), restore(Communication)]),
+        save(&[set(One, 1, 4)]),
+        save(&[set(Two, 2, 17), set(Three, 3, 30)]),
+        save(&[set(Three, 4, 31), restore(Two)]),
         Step::Restart,
-        save(&[set(Communication, 5, 0), set(Calibration, 6, 8), set(Device, 7, 4)]),
-        save(&[set(Application, 8, 40), set(Communication, 9, 12)]),
-        save(&[restore(Application)]),
-        save(&[set(Application, 10, 25)]),
+        save(&[set(Two, 5, 0), set(Four, 6, 8), set(One, 7, 4)]),
+        save(&[set(Three, 8, 40), set(Two, 9, 12)]),
+        save(&[restore(Three)]),
+        save(&[set(Three, 10, 25)]),
         Step::Restart,
-        save(&[set(Application, 11, 25), set(Communication, 12, 20)]),
-        save(&[set(Device, 13, 4)]),
+        save(&[set(Three, 11, 25), set(Two, 12, 20)]),
+        save(&[set(One, 13, 4)]),
         Step::Restart,
         Step::Restart,
-        save(&[set(Application, 14, 33), set(Device, 15, 4), restore(Calibration)]),
-        save(&[set(Application, 16, 33)]),
+        save(&[set(Three, 14, 33), set(One, 15, 4), restore(Four)]),
+        save(&[set(Three, 16, 33)]),
     ]
 }
 
@@ -77,7 +77,7 @@ fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on<co
     let total = cut_everywhere::<WORD>(|mut flash, allowed| {
         let model = recover(&mut flash, pages(WORD), &allowed);
         news += u32::from(allowed.len() == 2 && model == allowed[0]);
-        let changes = vec![set(ParameterGroup::Communication, 99, 21), restore(ParameterGroup::Device)];
+        let changes = vec![set(GroupNumber::Two, 99, 21), restore(GroupNumber::One)];
         start(&mut flash, pages(WORD)).unwrap().save(&as_changes(&changes)).unwrap();
         assert_eq!(read_good(&mut flash, pages(WORD)), after(&model, &changes));
     });
@@ -106,10 +106,7 @@ fn a_dozen_cuts_in_a_row_lose_nothing<const WORD: usize>() {
         let mut flash = flash::<WORD>(seed);
         let mut model = EMPTY;
         for round in 0..12 {
-            let changes = vec![
-                set(ParameterGroup::Device, round, 4),
-                set(ParameterGroup::Application, round + 100, 30),
-            ];
+            let changes = vec![set(GroupNumber::One, round, 4), set(GroupNumber::Three, round + 100, 30)];
             let steps = [Step::Save(changes.clone()), Step::Restart, Step::Save(changes)];
             let at = noise(seed * 100 + u64::from(round), 1)[0];
             flash.cut_after(u32::from(at) % 60, Weak::Random);

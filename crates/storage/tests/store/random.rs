@@ -5,7 +5,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use storage::mock::{MockFlash, Weak};
-use storage::{Pages, ParameterGroup};
+use storage::{GroupNumber, Pages};
 
 const fn pages(word: usize) -> Pages {
     Pages::new(512, 512).with_words(word as u32)
@@ -15,7 +15,7 @@ const fn pages(word: usize) -> Pages {
 type Life = (Vec<Step>, u32, Weak);
 
 fn changes() -> impl Strategy<Value = Changes> {
-    let group = prop::sample::select(ParameterGroup::ALL.to_vec());
+    let group = prop::sample::select(GroupNumber::ALL.to_vec());
     let value = prop::option::weighted(0.8, (any::<u16>(), 0_usize..120));
     let value = value.prop_map(|value| value.map(|(version, len)| (version, noise(len as u64, len))));
     vec((group, value), 1..4)

@@ -3,9 +3,8 @@
 //!
 //! A command ends with a carriage return. Success is answered with a carriage return, refusal with a bell.
 
-use std::fmt::Write as _;
-
-use canbus::{ExtendedId, Frame, Id, StandardId, Time};
+use canbus::{Frame, Id, Time};
+use wire::slcan;
 
 use super::session::{Action, Session};
 use crate::port::Adapter;
@@ -15,9 +14,6 @@ const BELL: &str = "\x07";
 
 /// Maximum length of a line; the longest valid line has 26 bytes.
 const MAX_LINE: usize = 64;
-
-/// Bit rates of S0 to S8 in bit/s.
-const BIT_RATES: [u32; 9] = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
 /// One command of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +42,7 @@ pub(super) enum Command {
 pub(super) fn parse(line: &str) -> Option<Command> {
     let (name, rest) = line.split_at_checked(1)?;
     match (name, rest) {
-        ("S", digit) => BIT_RATES.get(hex(digit, 1)? as usize).copied().map(Command::BitRate),
+        ("S", digit) => slcan::bit_rate(digit).map(|kbit| Command::BitRate(u32::from(kbit) * 1000)),
         ("O", "") => Some(Command::Open),
         ("L", "") => Some(Command::Listen),
         ("C", "") => Some(Command::Close),
@@ -55,55 +51,16 @@ pub(super) fn parse(line: &str) -> Option<Command> {
         ("F", "") => Some(Command::Flags),
         ("Z", "0") => Some(Command::TimeStamps(false)),
         ("Z", "1") => Some(Command::TimeStamps(true)),
-        ("t" | "r", rest) => {
-            let (digits, rest) = rest.split_at_checked(3)?;
-            let id = StandardId::new(u16::try_from(hex(digits, 3)?).ok()?)?;
-            parse_frame(id.into(), name == "r", rest)
-        }
-        ("T" | "R", rest) => {
-            let (digits, rest) = rest.split_at_checked(8)?;
-            parse_frame(ExtendedId::new(hex(digits, 8)?)?.into(), name == "R", rest)
-        }
-        _ => None,
+        // Behind the frame of a command nothing follows.
+        _ => slcan::frame(line).filter(|(_, rest)| rest.is_empty()).map(|(frame, _)| Command::Send(frame)),
     }
-}
-
-fn parse_frame(id: Id, remote: bool, rest: &str) -> Option<Command> {
-    let (digit, data) = rest.split_at_checked(1)?;
-    let dlc = u8::try_from(hex(digit, 1)?).ok()?;
-    if remote {
-        return if data.is_empty() { Frame::remote(id, dlc).map(Command::Send) } else { None };
-    }
-    let pairs = data.as_bytes().chunks(2).map(|pair| std::str::from_utf8(pair).ok());
-    let bytes: Option<Vec<u8>> = pairs.map(|pair| u8::try_from(hex(pair?, 2)?).ok()).collect();
-    bytes
-        .filter(|bytes| bytes.len() == usize::from(dlc))
-        .and_then(|bytes| Frame::data(id, &bytes))
-        .map(Command::Send)
-}
-
-/// A number of exactly `digits` hexadecimal digits.
-fn hex(text: &str, digits: usize) -> Option<u32> {
-    let plain = text.len() == digits && text.bytes().all(|byte| byte.is_ascii_hexdigit());
-    if plain { u32::from_str_radix(text, 16).ok() } else { None }
 }
 
 /// A received frame as a line. The time stamp counts milliseconds and starts again every minute (manual, `Zn`).
 fn format_frame(frame: &Frame, at: Time, stamped: bool) -> String {
-    let mut line = String::new();
-    // Writing to a string cannot fail.
-    let _ = match (frame.id(), frame.is_remote()) {
-        (Id::Standard(id), false) => write!(line, "t{:03X}", id.as_raw()),
-        (Id::Standard(id), true) => write!(line, "r{:03X}", id.as_raw()),
-        (Id::Extended(id), false) => write!(line, "T{:08X}", id.as_raw()),
-        (Id::Extended(id), true) => write!(line, "R{:08X}", id.as_raw()),
-    };
-    let _ = write!(line, "{:X}", frame.dlc());
-    for byte in frame.bytes() {
-        let _ = write!(line, "{byte:02X}");
-    }
+    let mut line = slcan::line(frame);
     if stamped {
-        let _ = write!(line, "{:04X}", at.as_micros() / 1000 % 60_000);
+        line += &format!("{:04X}", at.as_micros() / 1000 % 60_000);
     }
     line.push('\r');
     line
@@ -190,6 +147,7 @@ impl Session for Slcan {
 
 #[cfg(test)]
 mod tests {
+    use canbus::{ExtendedId, StandardId};
     use proptest::prelude::*;
 
     use super::*;

@@ -5,7 +5,8 @@
 
 use std::collections::BTreeSet;
 
-use canbus::{ExtendedId, Frame, Id, StandardId, Time};
+use canbus::{Frame, Id, Time};
+use wire::socketcand::{self, Bytes};
 
 use super::session::{Action, Session};
 use crate::port::Adapter;
@@ -54,66 +55,21 @@ pub(super) enum Refused {
 
 /// Parses one message without its brackets.
 pub(super) fn parse(text: &str) -> Result<Request, Refused> {
-    let mut words = text.split_ascii_whitespace();
-    let command = words.next().ok_or(Refused::NotAMessage)?;
-    let arguments: Vec<&str> = words.collect();
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    let (command, arguments) = words.split_first().ok_or(Refused::NotAMessage)?;
     let bad = Refused::BadArguments;
-    match (command, arguments.as_slice()) {
+    match (*command, arguments) {
         ("open", [bus]) => Ok(Request::Open((*bus).to_owned())),
         ("rawmode", []) => Ok(Request::RawMode),
         ("bcmmode", []) => Ok(Request::BcmMode),
         ("echo", []) => Ok(Request::Echo),
-        ("send", [id, dlc, bytes @ ..]) => parse_frame(id, dlc, bytes).map(Request::Send).ok_or(bad),
-        ("sendrtr", [id, dlc]) => parse_remote(id, dlc).map(Request::Send).ok_or(bad),
+        ("send" | "sendrtr", _) => socketcand::sent(&words).map(Request::Send).ok_or(bad),
         // An interval other than zero requests throttling, which only the kernel's broadcast manager offers.
-        ("subscribe", ["0", "0", id]) => parse_id(id).map(Request::Subscribe).ok_or(bad),
-        ("unsubscribe", [id]) => parse_id(id).map(Request::Unsubscribe).ok_or(bad),
-        ("open" | "rawmode" | "bcmmode" | "echo" | "send" | "sendrtr" | "subscribe" | "unsubscribe", _) => {
-            Err(bad)
-        }
+        ("subscribe", ["0", "0", id]) => socketcand::id(id).map(Request::Subscribe).ok_or(bad),
+        ("unsubscribe", [id]) => socketcand::id(id).map(Request::Unsubscribe).ok_or(bad),
+        ("open" | "rawmode" | "bcmmode" | "echo" | "subscribe" | "unsubscribe", _) => Err(bad),
         _ => Err(Refused::UnknownCommand),
     }
-}
-
-/// Up to three digits are a standard identifier, eight digits an extended identifier.
-fn parse_id(text: &str) -> Option<Id> {
-    let value = hex(text)?;
-    match text.len() {
-        1..=3 => StandardId::new(u16::try_from(value).ok()?).map(Id::Standard),
-        8 => ExtendedId::new(value).map(Id::Extended),
-        _ => None,
-    }
-}
-
-fn parse_frame(id: &str, dlc: &str, bytes: &[&str]) -> Option<Frame> {
-    let id = parse_id(id)?;
-    let bytes: Option<Vec<u8>> = bytes.iter().map(|byte| u8::try_from(hex(byte)?).ok()).collect();
-    let bytes = bytes?;
-    (hex(dlc)? as usize == bytes.len()).then(|| Frame::data(id, &bytes))?
-}
-
-fn parse_remote(id: &str, dlc: &str) -> Option<Frame> {
-    Frame::remote(parse_id(id)?, u8::try_from(hex(dlc)?).ok()?)
-}
-
-/// Unlike `from_str_radix`, this function accepts no sign.
-fn hex(text: &str) -> Option<u32> {
-    let plain = text.bytes().all(|byte| byte.is_ascii_hexdigit());
-    if plain { u32::from_str_radix(text, 16).ok() } else { None }
-}
-
-/// `< frame 123 1.000000 DEADBEEF >`, with two spaces before the bracket for an empty frame, or `< rtr 123 1.000000 8
-/// >`. The bytes are contiguous in raw mode, and separated in broadcast-manager mode.
-fn format_frame(frame: &Frame, at: Time, separator: &str) -> String {
-    let id = match frame.id() {
-        Id::Standard(id) => format!("{:03X}", id.as_raw()),
-        Id::Extended(id) => format!("{:08X}", id.as_raw()),
-    };
-    if frame.is_remote() {
-        return format!("< rtr {id} {at} {} >", frame.dlc());
-    }
-    let bytes: Vec<String> = frame.bytes().iter().map(|byte| format!("{byte:02X}")).collect();
-    format!("< frame {id} {at} {} >", bytes.join(separator))
 }
 
 /// The frames of the bus that are reported to the client.
@@ -208,8 +164,10 @@ impl Session for Socketcand {
 
     fn on_frame(&mut self, frame: &Frame, at: Time) -> Option<String> {
         match &self.mode {
-            Mode::Raw => Some(format_frame(frame, at, "")),
-            Mode::Broadcast(ids) if ids.contains(&key(frame.id())) => Some(format_frame(frame, at, " ")),
+            Mode::Raw => Some(socketcand::report(frame, at.as_micros(), Bytes::Together)),
+            Mode::Broadcast(ids) if ids.contains(&key(frame.id())) => {
+                Some(socketcand::report(frame, at.as_micros(), Bytes::Apart))
+            }
             Mode::Broadcast(_) | Mode::Closed => None,
         }
     }
@@ -217,6 +175,7 @@ impl Session for Socketcand {
 
 #[cfg(test)]
 mod tests {
+    use canbus::{ExtendedId, StandardId};
     use proptest::prelude::*;
 
     use super::*;

@@ -18,9 +18,7 @@ pub(crate) fn left(until: Instant) -> time::Duration {
     time::Duration::from_micros(until.0.saturating_sub(now().0))
 }
 
-/// `SECONDS.FRACTION`, as candump and socketcand write a time stamp; digits below a microsecond are cut off.
+/// The instant of a time stamp of candump or socketcand.
 pub(crate) fn parse(text: &str) -> Option<Instant> {
-    let (seconds, fraction) = text.split_once('.')?;
-    let micros = format!("{fraction:0<6}").get(..6)?.parse::<u64>().ok()?;
-    Some(Instant(seconds.parse::<u64>().ok()?.checked_mul(1_000_000)?.checked_add(micros)?))
+    wire::stamp::parse(text).map(Instant)
 }

@@ -4,45 +4,22 @@
 //! refusal. Some adapters do not answer every command, so nothing waits for an answer.
 
 use std::collections::VecDeque;
-use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
 
 use canopen::{Duration, Frame, Instant};
+use wire::slcan::{self, BIT_RATES};
 
 use super::stream::Stream;
 use super::{Bus, BusError, Received, clock};
-use crate::value::hex_bytes;
 
-/// Bit rates of S0 to S8 in kbit/s.
-const BIT_RATES: [u16; 9] = [10, 20, 50, 100, 125, 250, 500, 800, 1000];
 /// How long to wait for the greeting of a peer that is no adapter.
 const GREETING: Duration = Duration::from_millis(200);
 /// The longest line of an adapter is an extended frame with a time stamp: 30 characters.
 const LONGEST: usize = 64;
 
-/// Reads a line without its carriage return; `None` where the line is no frame with an 11-bit identifier.
-fn parse(line: &str) -> Option<Frame> {
-    let (kind, rest) = line.split_at_checked(1)?;
-    let (id, rest) = rest.split_at_checked(3)?;
-    let (len, rest) = rest.split_at_checked(1)?;
-    let (id, len) = (u16::from_str_radix(id, 16).ok()?, u8::from_str_radix(len, 16).ok()?);
-    match kind {
-        "r" => Frame::remote(id, len),
-        // A time stamp may follow the data.
-        "t" => Frame::new(id, &hex_bytes(rest.get(..2 * usize::from(len))?)?),
-        _ => None,
-    }
-}
-
 /// The line that sends a frame.
 fn format(frame: &Frame) -> String {
-    let kind = if frame.is_remote() { 'r' } else { 't' };
-    let mut line = format!("{kind}{:03X}{}", frame.id(), frame.len());
-    for byte in frame.data() {
-        // Writing to a string cannot fail.
-        let _ = write!(line, "{byte:02X}");
-    }
-    line + "\r"
+    slcan::line(frame) + "\r"
 }
 
 /// The commands that leave the bus if the adapter is on it, set the bit rate and go on the bus. The empty lines end an
@@ -56,7 +33,7 @@ fn opening(bit_rate: u16) -> io::Result<String> {
     Ok(format!("\r\rC\rS{index}\rO\r"))
 }
 
-/// Cuts a stream of bytes into frames.
+/// Cuts a stream of bytes into frames. What is no base frame is passed over.
 #[derive(Default)]
 struct Splitter(Vec<u8>);
 
@@ -65,7 +42,11 @@ impl Splitter {
         for &byte in bytes {
             match byte {
                 b'\r' | b'\x07' => {
-                    frames.extend(parse(&String::from_utf8_lossy(&std::mem::take(&mut self.0))));
+                    let line = std::mem::take(&mut self.0);
+                    // A time stamp may follow the frame.
+                    frames.extend(
+                        slcan::frame::<Frame>(&String::from_utf8_lossy(&line)).map(|(frame, _)| frame),
+                    );
                 }
                 // Some adapters acknowledge a sent frame without a carriage return.
                 b'z' | b'Z' if self.0.is_empty() => (),

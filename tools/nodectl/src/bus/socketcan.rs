@@ -4,8 +4,9 @@ use std::io::{self, ErrorKind};
 use std::thread;
 use std::time::Duration;
 
+use canopen::embedded_can::{from_driver, to_driver};
 use canopen::{Frame, Instant};
-use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Id, Socket, StandardId};
+use socketcan::{CanFrame, CanSocket, Socket};
 
 use super::stream::is_time_out;
 use super::{Bus, BusError, Received, clock};
@@ -47,7 +48,7 @@ impl Bus for SocketCan {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        let Some(frame) = to_host(frame) else { return Ok(()) };
+        let Some(frame) = to_driver::<CanFrame>(frame) else { return Ok(()) };
         for _ in 0..TRIES {
             match self.socket.write_frame(&frame) {
                 Err(error) if is_full(&error) => thread::sleep(FULL),
@@ -82,22 +83,12 @@ fn is_full(error: &io::Error) -> bool {
 
 /// The frame; `None` for a 29-bit identifier and for an error frame.
 fn from_host(frame: &CanFrame) -> Option<Frame> {
-    let Id::Standard(id) = frame.id() else { return None };
-    match frame {
-        CanFrame::Data(frame) => Frame::new(id.as_raw(), frame.data()),
-        CanFrame::Remote(frame) => Frame::remote(id.as_raw(), u8::try_from(frame.dlc()).ok()?),
-        CanFrame::Error(_) => None,
-    }
-}
-
-fn to_host(frame: &Frame) -> Option<CanFrame> {
-    let id = StandardId::new(frame.id())?;
-    if frame.is_remote() { CanFrame::new_remote(id, frame.len()) } else { CanFrame::new(id, frame.data()) }
+    if matches!(frame, CanFrame::Error(_)) { None } else { from_driver(frame) }
 }
 
 #[cfg(test)]
 mod tests {
-    use socketcan::ExtendedId;
+    use socketcan::{EmbeddedFrame, ExtendedId};
 
     use super::*;
 
@@ -105,7 +96,7 @@ mod tests {
     fn base_frames_cross_unchanged_and_extended_ones_do_not() {
         let frames = [Frame::new(0x181, &[1, 2, 3]), Frame::new(0x7FF, &[]), Frame::remote(0x701, 8)];
         for frame in frames.map(Option::unwrap) {
-            assert_eq!(from_host(&to_host(&frame).unwrap()), Some(frame));
+            assert_eq!(from_host(&to_driver(&frame).unwrap()), Some(frame));
         }
         let extended = CanFrame::new(ExtendedId::new(0x181).unwrap(), &[1]).unwrap();
         assert_eq!(from_host(&extended), None);

@@ -3,15 +3,14 @@
 //! Follows doc/protocol.md of <https://github.com/linux-can/socketcand>, in raw mode: the daemon reports every frame.
 
 use std::collections::VecDeque;
-use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
 use std::net::ToSocketAddrs;
 
 use canopen::{Duration, Frame, Instant};
+use wire::socketcand;
 
 use super::stream::Stream;
 use super::{Bus, BusError, Received, clock};
-use crate::value::hex_bytes;
 
 /// How long the daemon may take to answer.
 const ANSWER: Duration = Duration::from_millis(3000);
@@ -36,31 +35,11 @@ fn parse(text: &str) -> Message {
         ["hi"] => Message::Hi,
         ["ok"] => Message::Ok,
         ["error", reason @ ..] => Message::Error(reason.join(" ")),
-        ["frame", id, time, bytes @ ..] => frame(id, time, |id| Frame::new(id, &hex_bytes(&bytes.concat())?)),
-        ["rtr", id, time, len] => frame(id, time, |id| Frame::remote(id, len.parse().ok()?)),
-        _ => Message::Other,
+        words => match socketcand::reported(words) {
+            Some((frame, micros)) => Message::Frame(Received { frame, at: Instant(micros) }),
+            None => Message::Other,
+        },
     }
-}
-
-fn frame(id: &str, time: &str, frame: impl FnOnce(u16) -> Option<Frame>) -> Message {
-    // An identifier of eight digits is a 29-bit identifier, whatever its value.
-    let id = u16::from_str_radix(id, 16).ok().filter(|_| id.len() <= 3);
-    let received = || Some(Received { frame: frame(id?)?, at: clock::parse(time)? });
-    received().map_or(Message::Other, Message::Frame)
-}
-
-/// The message that sends a frame.
-fn format(frame: &Frame) -> String {
-    let (id, len) = (frame.id(), frame.len());
-    if frame.is_remote() {
-        return format!("< sendrtr {id:03X} {len} >");
-    }
-    let mut text = format!("< send {id:03X} {len} ");
-    for byte in frame.data() {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02X} ");
-    }
-    text + ">"
 }
 
 /// Cuts a stream of bytes into messages.
@@ -133,7 +112,7 @@ impl Bus for Socketcand {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.stream.write(&format(frame))
+        self.stream.write(&socketcand::send(frame))
     }
 
     fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
@@ -208,8 +187,11 @@ mod tests {
 
     #[test]
     fn frames_to_send() {
-        assert_eq!(format(&Frame::new(0x601, &[0x40, 0, 0x10]).unwrap()), "< send 601 3 40 00 10 >");
-        assert_eq!(format(&Frame::new(0x80, &[]).unwrap()), "< send 080 0 >");
-        assert_eq!(format(&Frame::remote(0x701, 1).unwrap()), "< sendrtr 701 1 >");
+        assert_eq!(
+            socketcand::send(&Frame::new(0x601, &[0x40, 0, 0x10]).unwrap()),
+            "< send 601 3 40 00 10 >"
+        );
+        assert_eq!(socketcand::send(&Frame::new(0x80, &[]).unwrap()), "< send 080 0 >");
+        assert_eq!(socketcand::send(&Frame::remote(0x701, 1).unwrap()), "< sendrtr 701 1 >");
     }
 }

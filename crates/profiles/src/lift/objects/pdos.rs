@@ -2,6 +2,7 @@
 //!
 //! A device has the PDOs of its virtual devices. It has no PDO of the pre-defined connection set of CiA 301 (1800h to
 //! 1803h with 180h + node-ID and up), so no two PDOs of a lift device can have the same CAN-ID.
+#![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use crate::communication::{self, inhibit_time, sync_start};
 use crate::lift::catalogue::{CobId, Content, Pdo, by_number};

@@ -1,4 +1,5 @@
 //! The position sensors of the lift: objects 2100h to 2106h, as in the encoder.
+#![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use crate::encoder;
 use canopen::dictionary::Object;

@@ -155,6 +155,7 @@ impl Places {
 }
 
 /// The places of `N` values, starting at a sub-index.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 const fn fields<const N: usize>(d: &Dictionary, index: u16, first: u8) -> [Field; N] {
     let mut fields = [d.field(index, first); N];
     let mut i: u8 = 0;

@@ -3,6 +3,7 @@
 
 mod rows;
 
+use canopen::ErrorClass;
 use canopen::dictionary::{Dictionary, Entry, Field, Object};
 use canopen::sdo::Abort;
 use profiles::board::{DIGITAL_INPUTS, DIGITAL_OUTPUTS, Inputs, Outputs, PowerOn};
@@ -71,7 +72,10 @@ pub(crate) struct Fields {
     polarity: Field,
     counts: [Field; DIGITAL_INPUTS],
     resets: Field,
+    at_sync: Field,
     lamps: Field,
+    error_mode: Field,
+    error_value: Field,
 }
 
 /// Looks the fields up during compilation.
@@ -81,7 +85,10 @@ pub(crate) const fn fields(d: &Dictionary) -> Fields {
         polarity: d.field(0x6002, 1),
         counts: [d.field(0x2400, 1), d.field(0x2400, 2)],
         resets: d.field(0x2402, 0),
+        at_sync: d.field(0x2403, 0),
         lamps: d.field(0x6200, 1),
+        error_mode: d.field(0x6206, 1),
+        error_value: d.field(0x6207, 1),
     }
 }
 
@@ -126,6 +133,18 @@ impl Profile for Objects {
         let resets = self.fields.resets.u8(image).wrapping_add(1);
         self.fields.resets.store(image, [resets]);
         Ok(())
+    }
+
+    fn synchronised(&mut self, _: Option<u8>, image: &mut [u8]) {
+        let state = self.fields.state.u8(image);
+        self.fields.at_sync.store(image, [state]);
+    }
+
+    /// The lamps that have an error mode take their error value (6206h and 6207h).
+    fn error(&mut self, _: ErrorClass, image: &mut [u8]) {
+        let (mode, value) = (self.fields.error_mode.u8(image), self.fields.error_value.u8(image));
+        let lamps = self.fields.lamps.u8(image) & !mode | value & mode;
+        self.fields.lamps.store(image, [lamps]);
     }
 
     fn outputs(&self, image: &[u8]) -> Outputs {

@@ -26,6 +26,8 @@ pub(super) const ROWS: &[&[Object]] = &[
             .mappable(Mapping::Tpdo),
         Object::new(0x2401, 0, "Zero counts", Type::Unsigned32, Access::WriteOnly).handled(),
         Object::new(0x2402, 0, "Commands taken", Type::Unsigned8, Access::ReadOnly),
+        Object::new(0x2403, 0, "Inputs at the last SYNC", Type::Unsigned8, Access::ReadOnly)
+            .mappable(Mapping::Tpdo),
         Object::highest(0x6000, 1, "Read input 8 bit"),
         Object::new(0x6000, 1, "Inputs 1 to 8", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo),
         Object::highest(0x6002, 1, "Polarity input 8 bit"),
@@ -33,5 +35,12 @@ pub(super) const ROWS: &[&[Object]] = &[
             .stored(Group::Application),
         Object::highest(0x6200, 1, "Write output 8 bit"),
         Object::new(0x6200, 1, "Outputs 1 to 8", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo),
+        Object::highest(0x6206, 1, "Error mode output 8 bit"),
+        Object::new(0x6206, 1, "Error mode of outputs 1 to 8", Type::Unsigned8, Access::ReadWrite)
+            .value(0xFF)
+            .stored(Group::Application),
+        Object::highest(0x6207, 1, "Error value output 8 bit"),
+        Object::new(0x6207, 1, "Error value of outputs 1 to 8", Type::Unsigned8, Access::ReadWrite)
+            .stored(Group::Application),
     ],
 ];

@@ -1,0 +1,149 @@
+//! The rows of PDOs: whole PDOs, and their single rows for a PDO that is not like others.
+
+use super::{list, parameter};
+use crate::dictionary::{DefaultValue, Object, Type};
+use crate::pdo::MappedObject;
+
+/// The default COB-ID of PDO `number`, from 1: `base` is 180h for a TPDO and 200h for an RPDO. The first four have a place in
+/// the pre-defined connection set (CiA 301, 7.3.5); any other is off.
+#[must_use]
+pub const fn default_id(base: u32, number: u16, is_on: bool) -> DefaultValue {
+    let off = if is_on { 0 } else { 1 << 31 };
+    match number {
+        1..=4 => DefaultValue::NodeId(off + base + 0x100 * (number as u32 - 1)),
+        _ => DefaultValue::Integer(1 << 31),
+    }
+}
+
+/// COB-ID, sub-index 1.
+#[must_use]
+pub const fn cob_id(index: u16, default: DefaultValue) -> Object {
+    parameter(index, 1, "COB-ID", Type::Unsigned32).default(default)
+}
+
+/// Transmission type, sub-index 2.
+#[must_use]
+pub const fn transmission_type(index: u16, default: i64) -> Object {
+    parameter(index, 2, "Transmission type", Type::Unsigned8).value(default)
+}
+
+/// Inhibit time of a TPDO in 100 us, sub-index 3.
+#[must_use]
+pub const fn inhibit_time(index: u16) -> Object {
+    parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us")
+}
+
+/// Event timer in ms, sub-index 5.
+#[must_use]
+pub const fn event_timer(index: u16, milliseconds: i64) -> Object {
+    parameter(index, 5, "Event timer", Type::Unsigned16).value(milliseconds).unit("ms")
+}
+
+/// SYNC start value of a TPDO, sub-index 6.
+#[must_use]
+pub const fn sync_start(index: u16) -> Object {
+    parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
+}
+
+/// The number of mapped objects. No limit in the table: 254 and 255 make it a multiplexed PDO, and the rule knows how
+/// many places there are.
+#[must_use]
+pub const fn count(index: u16, name: &'static str, used: i64) -> Object {
+    parameter(index, 0, name, Type::Unsigned8).value(used)
+}
+
+/// A mapped object: index, sub-index and length in bits.
+#[must_use]
+pub const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
+    parameter(index, sub, "Mapped object", Type::Unsigned32).value(mapped)
+}
+
+/// A mapping parameter with eight places, of which the first hold these objects.
+///
+/// # Panics
+/// During compilation, for more than eight objects.
+#[must_use]
+pub const fn mapping(index: u16, name: &'static str, mapped: &[i64]) -> [Object; 9] {
+    assert!(mapped.len() <= 8, "a PDO has eight places");
+    let mut rows: [Object; 9] = list(count(index, name, mapped.len() as i64), slot(index, 1, 0));
+    let mut i = 0;
+    while i < mapped.len() {
+        rows[i + 1] = rows[i + 1].value(mapped[i]);
+        i += 1;
+    }
+    rows
+}
+
+/// The communication parameter of an RPDO.
+#[must_use]
+pub const fn rpdo_parameter(index: u16, name: &'static str, id: DefaultValue) -> [Object; 4] {
+    [Object::highest(index, 5, name), cob_id(index, id), transmission_type(index, 255), event_timer(index, 0)]
+}
+
+/// The communication parameter of a TPDO.
+#[must_use]
+pub const fn tpdo_parameter(index: u16, name: &'static str, id: DefaultValue) -> [Object; 6] {
+    [
+        Object::highest(index, 6, name),
+        cob_id(index, id),
+        transmission_type(index, 255),
+        inhibit_time(index),
+        event_timer(index, 0),
+        sync_start(index),
+    ]
+}
+
+/// An RPDO, 1 to 512, taken when it comes: 1400h + `number` - 1 and 1600h + `number` - 1. It writes these objects and has
+/// eight places for them; without objects it is off.
+///
+/// # Panics
+/// During compilation, for a number that no RPDO has, and for objects that do not fit.
+#[must_use]
+pub const fn rpdo(number: u16, objects: &[Object]) -> [Object; 13] {
+    assert!(number >= 1 && number <= 512, "an RPDO has a number from 1 to 512");
+    let (index, id) = (0x1400 + number - 1, default_id(0x200, number, !objects.is_empty()));
+    let mut rows = [count(index, "", 0); 13];
+    copy(&rpdo_parameter(index, "RPDO communication parameter", id), &mut rows, 0);
+    copy(&mapping_of(index + 0x200, "RPDO mapping parameter", objects, false), &mut rows, 4);
+    rows
+}
+
+/// A TPDO, 1 to 512, sent with every change of these objects: 1800h + `number` - 1 and 1A00h + `number` - 1. It has eight
+/// places for objects; without objects it is off.
+///
+/// # Panics
+/// During compilation, for a number that no TPDO has, and for objects that do not fit.
+#[must_use]
+pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
+    assert!(number >= 1 && number <= 512, "a TPDO has a number from 1 to 512");
+    let (index, id) = (0x1800 + number - 1, default_id(0x180, number, !objects.is_empty()));
+    let mut rows = [count(index, "", 0); 15];
+    copy(&tpdo_parameter(index, "TPDO communication parameter", id), &mut rows, 0);
+    copy(&mapping_of(index + 0x200, "TPDO mapping parameter", objects, true), &mut rows, 6);
+    rows
+}
+
+/// A mapping parameter of objects that can be mapped.
+const fn mapping_of(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
+    assert!(objects.len() <= 8, "a PDO has eight places");
+    let (mut i, mut len, mut mapped) = (0, 0, [0; 8]);
+    while i < objects.len() {
+        let (object, mapping) = (&objects[i], objects[i].mapping);
+        assert!(!is_sent || mapping.allows_tpdo(), "an object cannot be mapped into a TPDO");
+        assert!(is_sent || mapping.allows_rpdo(), "an object cannot be mapped into an RPDO");
+        len += object.kind.size();
+        let object = MappedObject { index: object.index, sub: object.sub, bits: object.kind.size() * 8 };
+        mapped[i] = object.encode() as i64;
+        i += 1;
+    }
+    assert!(len <= 8, "the objects are longer than a PDO");
+    mapping(index, name, mapped.split_at(objects.len()).0)
+}
+
+const fn copy(from: &[Object], to: &mut [Object], first: usize) {
+    let mut i = 0;
+    while i < from.len() {
+        to[first + i] = from[i];
+        i += 1;
+    }
+}
