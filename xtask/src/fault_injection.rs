@@ -1,4 +1,4 @@
-//! `cargo xtask fault-injection`: builds the bootloader as its owner does, and has the emulated board skip its instructions.
+//! `cargo xtask fault-injection`: builds the bootloader as its owner does, and has the emulated board go wrong in its decision.
 
 use std::ffi::OsString;
 

@@ -14,9 +14,9 @@ fn bootloader() -> Vec<u8> {
 
 fn extent() -> Extent {
     if std::env::var("THOROUGH").is_ok_and(|value| value == "1") {
-        Extent { every: 10, every_of_loops: 200, flips: 4, boards: 2 }
+        Extent { every: 10, every_of_conditions: 10, every_of_loops: 200, flips: 4, boards: 2 }
     } else {
-        Extent { every: 400, every_of_loops: 2000, flips: 1, boards: 1 }
+        Extent { every: 400, every_of_conditions: 100, every_of_loops: 2000, flips: 1, boards: 1 }
     }
 }
 
@@ -31,9 +31,10 @@ fn holds(name: &str) {
     let broken = campaign
         .violations
         .iter()
-        .map(|violation| (violation.fault, violation.point.visit, places.name(violation.point.address)));
+        .map(|violation| (violation.fault, violation.point.visit, places.name(violation.fault.address())));
     assert_eq!(broken.collect::<Vec<_>>(), [], "{}", scene.what);
     assert!(campaign.faults() > 5);
+    assert!(campaign.tried("flags") > 5, "no condition was turned round");
 }
 
 #[test]
