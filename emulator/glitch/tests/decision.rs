@@ -43,6 +43,11 @@ fn an_application_that_nobody_has_signed_does_not_start() {
 }
 
 #[test]
+fn an_application_whose_signature_fits_an_equation_that_is_left_out_does_not_start() {
+    holds("neutral");
+}
+
+#[test]
 fn an_application_without_a_header_does_not_start() {
     holds("bare");
 }
@@ -60,4 +65,9 @@ fn an_older_image_is_not_copied() {
 #[test]
 fn an_unsigned_image_is_not_started_after_a_copy() {
     holds("waiting");
+}
+
+#[test]
+fn an_unsigned_image_does_not_come_back_after_a_trial() {
+    holds("returning");
 }
