@@ -64,10 +64,10 @@ fn run(cli: &Cli) -> Result<()> {
     };
     let watcher = Watcher { takes: &takes, broken: &broken };
     let mut violations = 0;
-    for scene in Scene::all()? {
-        if cli.scene.as_ref().is_some_and(|name| !scene.name.contains(name.as_str())) {
-            continue;
-        }
+    let mut scenes = Scene::all()?;
+    scenes.retain(|scene| cli.scene.as_ref().is_none_or(|name| scene.name.contains(name.as_str())));
+    ensure!(!scenes.is_empty(), "no scene has this name");
+    for scene in scenes {
         let begin = Instant::now();
         println!("{}: {}", scene.name, scene.what);
         let campaign = Campaign::run(&bootloader, &scene, extent, &watcher)?;
