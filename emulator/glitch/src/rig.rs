@@ -37,6 +37,9 @@ pub enum Outcome {
     Nothing,
 }
 
+/// A core without a clock is in its next instruction for seconds: the watchdog and the start after it are still waited for.
+const LEAST_SLICES: usize = 1000;
+
 /// Which of the outcomes that are known.
 const WITHOUT: usize = 0;
 const WITH_ANOTHER_START: usize = 1;
@@ -194,7 +197,8 @@ impl Rig {
     fn run(&mut self, has_good: bool, which: usize) -> Run {
         let mut restarts = Vec::new();
         let (begin, mut slept) = (self.machine.now(), self.machine.stats().asleep);
-        while self.machine.now() < begin + LIMIT {
+        let mut slices = 0..LEAST_SLICES;
+        while slices.next().is_some() || self.machine.now() < begin + LIMIT {
             if let Some(outcome) = self.seen(has_good, &mut slept) {
                 return Run { outcome, is_known: false, restarts };
             }
