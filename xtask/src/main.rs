@@ -53,7 +53,7 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
     },
-    /// Skip instructions and flip bits of registers while the bootloader decides what may start (docs/evidence.md)
+    /// Skip instructions and flip flags and bits of registers while the bootloader decides what may start (docs/evidence.md)
     #[command(disable_help_flag = true)]
     FaultInjection {
         /// Flags of the tool

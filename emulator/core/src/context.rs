@@ -8,6 +8,7 @@ use crate::engine;
 use crate::estimate::TAIL_CHAIN;
 use crate::exception::Exception;
 use crate::fault::Fault;
+use crate::it_block;
 use crate::machine::Machine;
 use crate::mechanism::Mechanism;
 
@@ -31,10 +32,9 @@ const CALLEE_SAVED: [RegisterARM; 8] = [
 const BASIC: u32 = 8;
 const EXTENDED: u32 = 26;
 
-/// xPSR: Thumb state, the frame was aligned to eight bytes, the IT state.
+/// xPSR: Thumb state, the frame was aligned to eight bytes.
 pub(crate) const THUMB: u32 = 1 << 24;
 const ALIGNED: u32 = 1 << 9;
-const IT: u32 = 0x0600_FC00;
 
 /// CONTROL: Thread mode has no privileges; it uses the process stack; floating-point registers are in use.
 const NPRIV: u32 = 1 << 0;
@@ -209,7 +209,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         let words: Option<Vec<u32>> = (0..count).map(|n| self.word(top.wrapping_add(4 * n))).collect();
         let Some(words) = words else { return self.take_fault(Fault::unstacking(top)) };
         let handler = self.register(RegisterARM::XPSR);
-        self.set_xpsr(handler & !IT);
+        self.set_xpsr(handler & !it_block::STATE);
         self.clear_monitor();
         let xpsr = words[7];
         let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
@@ -246,8 +246,9 @@ impl<P: Peripherals + 'static> Machine<P> {
     }
 
     /// Writes all of xPSR. The register holds the exception number, so the write also switches the mode.
-    fn set_xpsr(&mut self, value: u32) {
-        let value = if self.cpu.get_data().lacks(Mechanism::ItState) { value & !IT } else { value };
+    pub(crate) fn set_xpsr(&mut self, value: u32) {
+        let value =
+            if self.cpu.get_data().lacks(Mechanism::ItState) { value & !it_block::STATE } else { value };
         self.set(RegisterARM::XPSR_NZCVQG, value);
         self.rebuild_flags(value);
     }

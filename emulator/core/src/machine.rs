@@ -37,6 +37,8 @@ pub enum Stop {
     PowerCut,
     /// A watched point of [`Machine::watch`] is reached.
     Watched,
+    /// The chip was reset, and nothing has run since: see [`Machine::stop_at_resets`].
+    Reset,
 }
 
 /// A core, its memory, and a chip.
@@ -55,6 +57,10 @@ pub struct Machine<P: Peripherals + 'static> {
     pub(crate) watching: Option<UcHookId>,
     /// The program has stopped at a watched point.
     at_point: bool,
+    /// [`Machine::run_until`] comes back after a reset.
+    stops_at_resets: bool,
+    /// The chip was reset since the last look.
+    was_reset: bool,
     /// Output of the program by semihosting; `None` without a debugger.
     pub(crate) printed: Option<Vec<u8>>,
 }
@@ -79,6 +85,8 @@ impl<P: Peripherals + 'static> Machine<P> {
             incidents: vec![],
             watching: None,
             at_point: false,
+            stops_at_resets: false,
+            was_reset: false,
             printed: None,
         })
     }
@@ -281,6 +289,9 @@ impl<P: Peripherals + 'static> Machine<P> {
             if let Some(stop) = self.attend() {
                 return stop;
             }
+            if self.is_at_reset() {
+                return Stop::Reset;
+            }
             if self.now() >= until {
                 return self.locked.map_or(Stop::Reached, |pc| Stop::Lockup { pc });
             }
@@ -291,6 +302,18 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
+    /// Has [`Machine::run_until`] come back after each reset, before the first instruction, from now on or no longer.
+    pub fn stop_at_resets(&mut self, on: bool) {
+        self.stops_at_resets = on;
+        self.was_reset = false;
+    }
+
+    /// After a reset whose effects on memory are over.
+    fn is_at_reset(&mut self) -> bool {
+        let is_over = self.cpu.get_data().effects.is_empty();
+        self.stops_at_resets && is_over && std::mem::take(&mut self.was_reset)
+    }
+
     /// The machine's own part of a [`crate::Moment`].
     pub(crate) fn state(&self) -> (bool, Option<u32>, Time, bool) {
         (self.sleeping, self.locked, self.stall, self.loading)
@@ -298,6 +321,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     pub(crate) fn set_state(&mut self, state: (bool, Option<u32>, Time, bool)) {
         (self.sleeping, self.locked, self.stall, self.loading) = state;
+        self.was_reset = false;
         self.powered = true;
     }
 
@@ -469,6 +493,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     fn reset(&mut self, incident: Incident) {
         self.note(incident);
+        self.was_reset = true;
         let core = self.cpu.get_data_mut();
         core.chip.reset(false, core.now);
         self.restart();

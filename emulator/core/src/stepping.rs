@@ -66,6 +66,12 @@ pub(crate) const LONGEST_BLOCK: usize = 18;
 
 /// Length in bytes of the instruction at the start of `code`; for an IT instruction, with its block (ARMv7-M, A7.7.37).
 pub(crate) fn length(code: &[u8]) -> u32 {
+    // Most are no IT instruction, and this is asked of every instruction that runs.
+    if let [low, high, ..] = code
+        && !is_it(u16::from_le_bytes([*low, *high]))
+    {
+        return width(u16::from_le_bytes([*low, *high]));
+    }
     instructions(code).last().map_or(0, |(at, size)| at + size)
 }
 
@@ -77,8 +83,7 @@ pub(crate) fn instructions(code: &[u8]) -> Vec<(u32, u32)> {
         bytes.map(|bytes| u16::from_le_bytes([bytes[0], bytes[1]]))
     };
     let first = half(0).unwrap_or(0);
-    let conditional =
-        if first >> 8 == 0xBF && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 };
+    let conditional = if is_it(first) { 4 - (first & 0xF).trailing_zeros() } else { 0 };
     let mut all = vec![(0, width(first))];
     for _ in 0..conditional {
         let at = all.last().map_or(0, |(at, size)| at + size);
@@ -86,6 +91,10 @@ pub(crate) fn instructions(code: &[u8]) -> Vec<(u32, u32)> {
         all.push((at, width(next)));
     }
     all
+}
+
+fn is_it(first: u16) -> bool {
+    first >> 8 == 0xBF && first & 0xF != 0
 }
 
 /// Length in bytes of an instruction that begins with this halfword.

@@ -10,6 +10,7 @@ use unicorn_engine::{Context, RegisterARM, UcHookId};
 
 use crate::core::CoreMoment;
 use crate::engine;
+use crate::it_block;
 use crate::machine::Machine;
 use crate::model::Error;
 use crate::stepping;
@@ -21,6 +22,29 @@ pub struct Point {
     pub address: u32,
     /// The number of the visit: 1 is the first.
     pub visit: u64,
+}
+
+/// A condition flag of the core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Flag {
+    /// Negative.
+    N,
+    /// Zero.
+    Z,
+    /// Carry.
+    C,
+    /// Overflow.
+    V,
+}
+
+impl Flag {
+    /// All of them.
+    pub const ALL: [Flag; 4] = [Flag::N, Flag::Z, Flag::C, Flag::V];
+
+    /// In the register APSR.
+    fn bit(self) -> u32 {
+        1 << (31 - self as u32)
+    }
 }
 
 /// The state of the watch.
@@ -166,8 +190,12 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// The next instruction, and those of its block if it is an IT instruction: address and length of each.
     pub fn next_instructions(&self) -> Vec<(u32, u32)> {
+        self.instructions_at(self.pc())
+    }
+
+    /// The same of the instruction at an address.
+    pub fn instructions_at(&self, address: u32) -> Vec<(u32, u32)> {
         let mut code = [0; stepping::LONGEST_BLOCK];
-        let address = self.pc();
         // Unreadable code stays zero.
         let _ = self.read(address, &mut code);
         stepping::instructions(&code).into_iter().map(|(at, size)| (address + at, size)).collect()
@@ -191,6 +219,44 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::store(&mut self.cpu, address, &NOPS[..size as usize])?;
         self.run_until_outside(first..end)?;
         engine::store(&mut self.cpu, address, original)
+    }
+
+    /// Goes on up to this instruction of the IT block that is next, so that a fault can come between two instructions of the block.
+    /// Does nothing for an instruction outside of the block, and for the IT instruction.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn go_into_block(&mut self, address: u32) -> Result<(), Error> {
+        let index = self.next_instructions().iter().position(|(at, _)| *at == address);
+        let Some(before) = index.and_then(|index| index.checked_sub(1)) else { return Ok(()) };
+        let mut it = [0];
+        let _ = self.read(self.pc(), &mut it);
+        self.run_start_of_block(address, it, before)?;
+        // After a fault in the start of the block the rest of the block does not follow.
+        if self.pc() == address {
+            let rest = (0..before).fold(it[0], |it, _| it_block::advanced(it));
+            let xpsr = self.register(RegisterARM::XPSR);
+            self.set_xpsr(xpsr & !it_block::STATE | it_block::state(rest));
+        }
+        Ok(())
+    }
+
+    /// The first `count` instructions of an IT block. The library stops at the end of a block only: so the block is made to end there.
+    fn run_start_of_block(&mut self, end: u32, it: [u8; 1], count: usize) -> Result<(), Error> {
+        let first = self.pc();
+        if count == 0 {
+            self.set(RegisterARM::PC, end | 1);
+            return Ok(());
+        }
+        engine::store(&mut self.cpu, first, &[it_block::shortened(it[0], count)])?;
+        self.run_until_outside(first..end)?;
+        engine::store(&mut self.cpu, first, &it)
+    }
+
+    /// Changes one condition flag.
+    pub fn flip_flag(&mut self, flag: Flag) {
+        let flags = self.register(RegisterARM::APSR_NZCV);
+        self.set(RegisterARM::APSR_NZCV, flags ^ flag.bit());
     }
 
     /// Flips one bit of R0 to R14.

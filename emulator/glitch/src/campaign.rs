@@ -1,13 +1,15 @@
 //! All points of a scene, or some of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::thread;
 
 use anyhow::{Result, anyhow, ensure};
 use emulator::Point;
-use fastrand::Rng;
 
-use crate::rig::{Fault, Outcome, Rig};
+use crate::choice;
+use crate::fault::Fault;
+use crate::reads::{Decoder, Reads};
+use crate::rig::{Outcome, Rig};
 use crate::scene::Scene;
 
 /// How much is tried.
@@ -15,9 +17,11 @@ use crate::scene::Scene;
 pub struct Extent {
     /// Every so many instructions is a point: 1 takes all.
     pub every: usize,
+    /// The same of those that read condition flags.
+    pub every_of_conditions: usize,
     /// The same of those that run more often than [`OFTEN`].
     pub every_of_loops: usize,
-    /// So many bits of registers are flipped at each point, one after the other.
+    /// So many bits of the registers that an instruction reads are flipped at each point, one after the other.
     pub flips: usize,
     /// Threads, each with a board of its own.
     pub boards: usize,
@@ -53,7 +57,9 @@ pub struct Campaign {
     pub loops: usize,
     /// Points at which the program was stopped.
     pub points: usize,
-    /// Skips and flips, by what came of them.
+    /// Bits of the registers that are read at these points, whether tried or not.
+    pub bits: usize,
+    /// Faults by their kind and by what came of them.
     pub outcomes: BTreeMap<(&'static str, &'static str), usize>,
     /// The faults that made run what may not.
     pub violations: Vec<Violation>,
@@ -69,13 +75,18 @@ impl Campaign {
         let (visits, outcome) = rig.survey(scene)?;
         let expected = if scene.has_good { Outcome::Good } else { Outcome::Stays };
         ensure!(outcome == expected, "{}: without a fault the outcome is {outcome:?}", scene.name);
-        let undisturbed = rig.undisturbed;
-        let (loops, rest): (Vec<&Point>, Vec<&Point>) = visits.iter().partition(|point| point.visit > OFTEN);
+        let visits: Vec<Point> = visits.into_iter().filter(|point| (watcher.takes)(point.address)).collect();
+        let (loops, rest): (Vec<Point>, Vec<Point>) = visits.iter().partition(|point| point.visit > OFTEN);
+        let conditions = conditions(&rig, &rest)?;
+        let (conditions, rest): (Vec<Point>, Vec<Point>) =
+            rest.iter().partition(|point| conditions.contains(&point.address));
         let chosen = rest
-            .into_iter()
+            .iter()
             .step_by(extent.every)
-            .chain(loops.iter().copied().step_by(extent.every_of_loops));
+            .chain(conditions.iter().step_by(extent.every_of_conditions))
+            .chain(loops.iter().step_by(extent.every_of_loops));
         let chosen: Vec<Point> = chosen.flat_map(ends).collect();
+        let undisturbed = rig.undisturbed;
         let shares = chosen.chunks(chosen.len().div_ceil(extent.boards.max(1)).max(1));
         let parts: Vec<Result<Campaign>> = thread::scope(|scope| {
             let boards: Vec<_> = shares
@@ -98,8 +109,15 @@ impl Campaign {
         self.outcomes.values().sum()
     }
 
+    /// Faults of this kind that were tried: "skips", "flags" or "register bits".
+    #[must_use]
+    pub fn tried(&self, kind: &str) -> usize {
+        self.outcomes.iter().filter(|((of, _), _)| *of == kind).map(|(_, count)| count).sum()
+    }
+
     fn add(&mut self, part: Campaign) {
         self.points += part.points;
+        self.bits += part.bits;
         self.violations.extend(part.violations);
         for (kind, count) in part.outcomes {
             *self.outcomes.entry(kind).or_default() += count;
@@ -107,17 +125,13 @@ impl Campaign {
     }
 
     fn note(&mut self, point: Point, fault: Fault, outcome: Outcome) {
-        let kind = match fault {
-            Fault::Skip(..) => "skips",
-            Fault::Flip(..) => "flips",
-        };
         let what = match outcome {
             Outcome::Broken => "broken",
             Outcome::Good => "the good application runs",
             Outcome::Stays => "the bootloader stays",
             Outcome::Nothing => "neither within 8 s",
         };
-        *self.outcomes.entry((kind, what)).or_default() += 1;
+        *self.outcomes.entry((fault.kind(), what)).or_default() += 1;
         if outcome == Outcome::Broken {
             self.violations.push(Violation { point, fault });
         }
@@ -130,6 +144,19 @@ fn ends(last: &Point) -> impl Iterator<Item = Point> + use<> {
     [first].into_iter().chain((last.visit > 1).then_some(*last))
 }
 
+/// The instructions that read condition flags, and the IT instructions of blocks that do.
+fn conditions(rig: &Rig, points: &[Point]) -> Result<HashSet<u32>> {
+    let decoder = Decoder::new()?;
+    let mut all = HashSet::new();
+    for point in points {
+        let reads = decoder.reads(point.address, &rig.code(point.address))?;
+        if reads.iter().any(|reads| reads.flags) {
+            all.insert(point.address);
+        }
+    }
+    Ok(all)
+}
+
 /// What one board does: it runs once, from point to point.
 fn part(
     bootloader: &[u8],
@@ -140,13 +167,16 @@ fn part(
     watcher: &Watcher<'_>,
 ) -> Result<Campaign> {
     let mut campaign = Campaign::default();
+    let decoder = Decoder::new()?;
     let mut rig = Rig::new(bootloader)?;
     rig.undisturbed = undisturbed.to_vec();
     rig.start(scene, points.to_vec())?;
     while let Some(point) = rig.next(scene.has_good)? {
         let moment = rig.stop()?;
         campaign.points += 1;
-        for fault in rig.skips().into_iter().chain(some_flips(point, flips)) {
+        let reads = decoder.reads(point.address, &rig.code(point.address))?;
+        campaign.bits += reads.iter().map(choice::possible).sum::<usize>();
+        for fault in rig.skips().into_iter().chain(wrong_reads(&reads, point, flips)) {
             let outcome = rig.disturb(fault, scene.has_good)?;
             campaign.note(point, fault, outcome);
             if outcome == Outcome::Broken {
@@ -158,11 +188,8 @@ fn part(
     Ok(campaign)
 }
 
-/// Bits of R0 to R14, each of them at most once: those of a point are the same in every run.
-fn some_flips(point: Point, flips: usize) -> Vec<Fault> {
-    const REGISTERS: usize = 15;
-    const BITS: usize = 32;
-    let mut random = Rng::with_seed(u64::from(point.address) << 32 ^ point.visit);
-    let chosen = random.choose_multiple(0..REGISTERS * BITS, flips);
-    chosen.into_iter().map(|at| Fault::Flip((at / BITS) as u8, (at % BITS) as u8)).collect()
+/// What may be wrong of that which the instructions of a point read.
+fn wrong_reads(reads: &[Reads], point: Point, flips: usize) -> Vec<Fault> {
+    let of = |reads| [choice::flags(reads), choice::some_bits(reads, point.visit, flips)].concat();
+    reads.iter().flat_map(of).collect()
 }

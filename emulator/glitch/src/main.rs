@@ -8,8 +8,8 @@ use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use glitch::{Campaign, Extent, Places, Scene, Violation, Watcher};
 
-/// Skips each instruction of the bootloader's decision, and flips bits of registers before it: nothing that is unsigned or older may
-/// start.
+/// Skips each instruction of the bootloader's decision, flips each condition flag where it reads flags, and flips bits of the registers
+/// that it reads: nothing that is unsigned or older may start.
 #[derive(Parser)]
 #[command(name = "cargo xtask fault-injection", version)]
 struct Cli {
@@ -28,7 +28,7 @@ struct Cli {
     /// Take every so many of those in the loops of hashes, sums and points
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every_of_loops: u16,
-    /// Flip so many bits of registers at each point; there are 480
+    /// Flip so many bits of the registers that an instruction reads; a register has 32
     #[arg(long, default_value_t = 4)]
     flips: usize,
 }
@@ -50,12 +50,13 @@ fn run(cli: &Cli) -> Result<()> {
     let boards = std::thread::available_parallelism()?.get();
     let extent = Extent {
         every: cli.every.into(),
+        every_of_conditions: cli.every.into(),
         every_of_loops: cli.every_of_loops.into(),
         flips: cli.flips,
         boards,
     };
     let broken = |Violation { point, fault }: Violation| {
-        println!("  BROKEN {fault:?}, visit {}: {}", point.visit, places.name(point.address));
+        println!("  BROKEN by {fault}, visit {}: {}", point.visit, places.name(fault.address()));
     };
     let takes = |address| {
         let name = places.name(address);
@@ -63,10 +64,10 @@ fn run(cli: &Cli) -> Result<()> {
     };
     let watcher = Watcher { takes: &takes, broken: &broken };
     let mut violations = 0;
-    for scene in Scene::all()? {
-        if cli.scene.as_ref().is_some_and(|name| !scene.name.contains(name.as_str())) {
-            continue;
-        }
+    let mut scenes = Scene::all()?;
+    scenes.retain(|scene| cli.scene.as_ref().is_none_or(|name| scene.name.contains(name.as_str())));
+    ensure!(!scenes.is_empty(), "no scene has this name");
+    for scene in scenes {
         let begin = Instant::now();
         println!("{}: {}", scene.name, scene.what);
         let campaign = Campaign::run(&bootloader, &scene, extent, &watcher)?;
@@ -82,6 +83,13 @@ fn print(campaign: &Campaign, seconds: f64) {
     let Campaign { instructions, loops, points, .. } = campaign;
     println!("  {instructions} instructions, {loops} of them in loops of hashes, sums and points");
     println!("  {} faults at {points} points, {seconds:.0} s", campaign.faults());
+    println!(
+        "  {} skips, {} flags, {} of {} bits of the registers that are read",
+        campaign.tried("skips"),
+        campaign.tried("flags"),
+        campaign.tried("register bits"),
+        campaign.bits
+    );
     for ((kind, what), count) in &campaign.outcomes {
         println!("  {count:>8} {kind}: {what}");
     }

@@ -14,9 +14,9 @@ fn bootloader() -> Vec<u8> {
 
 fn extent() -> Extent {
     if std::env::var("THOROUGH").is_ok_and(|value| value == "1") {
-        Extent { every: 10, every_of_loops: 200, flips: 4, boards: 2 }
+        Extent { every: 10, every_of_conditions: 10, every_of_loops: 200, flips: 4, boards: 2 }
     } else {
-        Extent { every: 400, every_of_loops: 2000, flips: 1, boards: 1 }
+        Extent { every: 400, every_of_conditions: 100, every_of_loops: 2000, flips: 1, boards: 1 }
     }
 }
 
@@ -31,14 +31,20 @@ fn holds(name: &str) {
     let broken = campaign
         .violations
         .iter()
-        .map(|violation| (violation.fault, violation.point.visit, places.name(violation.point.address)));
+        .map(|violation| (violation.fault, violation.point.visit, places.name(violation.fault.address())));
     assert_eq!(broken.collect::<Vec<_>>(), [], "{}", scene.what);
     assert!(campaign.faults() > 5);
+    assert!(campaign.tried("flags") > 5, "no condition was turned round");
 }
 
 #[test]
 fn an_application_that_nobody_has_signed_does_not_start() {
     holds("unsigned");
+}
+
+#[test]
+fn an_application_whose_signature_fits_an_equation_that_is_left_out_does_not_start() {
+    holds("neutral");
 }
 
 #[test]
@@ -59,4 +65,9 @@ fn an_older_image_is_not_copied() {
 #[test]
 fn an_unsigned_image_is_not_started_after_a_copy() {
     holds("waiting");
+}
+
+#[test]
+fn an_unsigned_image_does_not_come_back_after_a_trial() {
+    holds("returning");
 }

@@ -1,0 +1,62 @@
+//! What goes wrong in the core.
+
+use std::fmt;
+
+use emulator::Flag;
+
+/// One fault of the core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// An instruction does not run.
+    Skip {
+        /// The address of the instruction.
+        at: u32,
+        /// Bytes of the instruction.
+        size: u32,
+    },
+    /// A condition flag is another one when this instruction reads the flags, and from then on.
+    Flag {
+        /// The address of the instruction.
+        at: u32,
+        /// The flag.
+        flag: Flag,
+    },
+    /// A bit of R0 to R14 is another one when this instruction reads the register, and from then on.
+    Flip {
+        /// The address of the instruction.
+        at: u32,
+        /// The number of the register.
+        register: u8,
+        /// The number of the bit.
+        bit: u8,
+    },
+}
+
+impl Fault {
+    /// The instruction that is the first to be disturbed.
+    #[must_use]
+    pub fn address(self) -> u32 {
+        match self {
+            Fault::Skip { at, .. } | Fault::Flag { at, .. } | Fault::Flip { at, .. } => at,
+        }
+    }
+
+    /// How a campaign counts the fault.
+    pub(crate) fn kind(self) -> &'static str {
+        match self {
+            Fault::Skip { .. } => "skips",
+            Fault::Flag { .. } => "flags",
+            Fault::Flip { .. } => "register bits",
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Fault::Skip { .. } => write!(text, "skip"),
+            Fault::Flag { flag, .. } => write!(text, "flag {flag:?}"),
+            Fault::Flip { register, bit, .. } => write!(text, "bit {bit} of R{register}"),
+        }
+    }
+}
