@@ -130,17 +130,15 @@ impl Server {
         objects: &mut impl Objects,
         now: Instant,
     ) -> Result<(), Abort> {
-        match Initiate::parse(frame) {
-            Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now),
-            Initiate::Unsized(data) => {
-                let value = unsized_value(data, at, objects)?;
-                objects.write(at, value.as_slice(), now)
-            }
+        let value = match Initiate::parse(frame) {
+            Initiate::Expedited(bytes) => bytes,
+            Initiate::Unsized(data) => unsized_value(data, at, objects)?,
             Initiate::Segmented(size) => {
                 self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
-                Ok(())
+                return Ok(());
             }
-        }
+        };
+        objects.write(at, value.as_slice(), now)
     }
 
     fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
