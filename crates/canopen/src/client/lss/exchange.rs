@@ -1,4 +1,4 @@
-//! A service with an answer.
+//! An LSS service with an answer.
 
 use super::{Error, Name, Options, frame, response};
 use crate::client::service::later;
@@ -9,15 +9,15 @@ use crate::{Frame, Instant};
 /// Interprets a response to the last request; `None` for a response that does not answer the request.
 type Fits<T> = fn(Request, Response) -> Option<Result<T, Error>>;
 
-/// Up to four requests and the answer to the last of them. All requests are sent again when there is no answer: none of
-/// them does harm when it comes twice.
+/// Up to four requests and the answer to the last request. Without an answer, all requests are sent again: none of
+/// them does harm when it arrives twice.
 #[derive(Clone, Copy, Debug)]
 pub struct Exchange<T> {
     name: Name,
     requests: [Option<Request>; 4],
     fits: Fits<T>,
     options: Options,
-    /// Requests that have been sent, of this attempt.
+    /// How many requests of this attempt have been sent.
     sent: usize,
     until: Instant,
     answer: Option<Result<T, Error>>,

@@ -1,25 +1,25 @@
-//! The services, each as the exchange or the frame that it is.
+//! The LSS services: each is an exchange, or one frame.
 
 use super::{Error, Exchange, Name, Options, frame};
 use crate::lss::{BitRate, Identity, Part, Request, Response};
 use crate::{Frame, NodeId};
 
-/// Switch state global: all slaves to the state configuration, or back to waiting. Slaves that have got a node-ID and had
-/// none boot with it when they are back.
+/// Switch state global: switches all slaves to the configuration state, or back to the waiting state. A slave that has
+/// received its first node-ID boots with this node-ID when it returns to the waiting state.
 #[must_use]
 pub fn switch_global(configuration: bool) -> Frame {
     frame(Request::SwitchGlobal { configuration })
 }
 
-/// Activate bit timing parameters: the selected slaves change to their new bit rate, `delay` ms from now, and are silent
-/// for as long again. The master's side of the bus has to change too.
+/// Activate bit timing parameters: the selected slaves change to their new bit rate after `delay` ms, and send nothing
+/// for another `delay` ms. The master has to change its own bit rate too.
 #[must_use]
 pub fn activate_bit_rate(delay: u16) -> Frame {
     frame(Request::Activate { delay })
 }
 
-/// Switch state selective: the slave with this identity to the state configuration. Slaves that are in this state
-/// already stay; [`switch_global`] releases them.
+/// Switch state selective: switches the slave with this identity to the configuration state. Slaves that are in this
+/// state already stay there; [`switch_global`] releases them.
 #[must_use]
 pub fn select(identity: &Identity, options: Options) -> Exchange<()> {
     let requests = Part::ALL.map(|part| Some(Request::Select(part, identity.part(part))));
@@ -31,8 +31,8 @@ pub fn select(identity: &Identity, options: Options) -> Exchange<()> {
     )
 }
 
-/// Identify non-configured remote slaves: whether there is a slave without a node-ID. Any number of them answers with the
-/// same frame; `NoAnswer` when there is none.
+/// Identify non-configured remote slaves: asks whether there is a slave without a node-ID. All such slaves answer with
+/// the same frame. The result is [`Error::NoAnswer`] when there is none.
 #[must_use]
 pub fn identify_unconfigured(options: Options) -> Exchange<()> {
     let fits = |_, response| (response == Response::Unconfigured).then_some(Ok(()));
@@ -49,7 +49,7 @@ pub fn inquire(part: Part, options: Options) -> Exchange<u32> {
     Exchange::new(Name::Inquire, Request::Inquire(part), fits, options)
 }
 
-/// Inquire node-ID: that of the selected slave; `None` when it has none.
+/// Inquire node-ID: the node-ID of the selected slave; `None` when the slave has none.
 #[must_use]
 pub fn inquire_node_id(options: Options) -> Exchange<Option<NodeId>> {
     let fits = |_, response| match response {
@@ -59,8 +59,8 @@ pub fn inquire_node_id(options: Options) -> Exchange<Option<NodeId>> {
     Exchange::new(Name::Inquire, Request::InquireNodeId, fits, options)
 }
 
-/// Configure node-ID: gives the selected slave a node-ID, or takes it away with `None`. It is in use after the next reset
-/// of the communication, or at once by a slave that had none.
+/// Configure node-ID: gives the selected slave a node-ID, or takes the node-ID away with `None`. The slave uses the new
+/// node-ID after the next reset of the communication; a slave that had no node-ID uses it at once.
 #[must_use]
 pub fn set_node_id(node_id: Option<NodeId>, options: Options) -> Exchange<()> {
     let fits = |_, response| match response {
@@ -81,8 +81,8 @@ pub fn set_bit_rate(bit_rate: BitRate, options: Options) -> Exchange<()> {
     Exchange::new(Name::BitRate, request, fits, options)
 }
 
-/// Store configuration: the selected slave keeps node-ID and bit rate over a loss of power. A slave may take its time
-/// to write them.
+/// Store configuration: the selected slave stores node-ID and bit rate in non-volatile memory. The slave may need more
+/// time than for other requests.
 #[must_use]
 pub fn store(options: Options) -> Exchange<()> {
     let fits = |_, response| match response {

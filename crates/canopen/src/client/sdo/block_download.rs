@@ -6,35 +6,35 @@ use super::{BlockDownload, Error, Options};
 use crate::sdo::{BlockEnd, BlockSegment, BlockSize, Bytes, Multiplexer, Request, Response, crc};
 use crate::{Instant, NodeId};
 
-/// So many blocks in a row of which nothing arrives, and the transfer has failed.
+/// The transfer fails after this many blocks in a row without a segment that the server acknowledged.
 const FUTILE: u8 = 3;
 
 /// A block download under way.
 #[derive(Debug)]
 pub struct Protocol<'a> {
     data: &'a [u8],
-    /// Bytes that the server has acknowledged: where the block begins.
+    /// Bytes that the server has acknowledged: the present block begins here.
     done: usize,
     phase: Phase,
-    /// Blocks in a row of which nothing has arrived.
+    /// Blocks in a row of which the server acknowledged no segment.
     futile: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Phase {
-    /// The server has not said how long a block may be.
+    /// The server has not yet announced the size of a block.
     Begin,
     Block {
         size: BlockSize,
-        /// Segments of this block that have been handed over.
+        /// Segments of this block that have been sent.
         sent: u8,
     },
-    /// All has arrived; the server has not said that it is good.
+    /// The server has acknowledged all data, but has not yet confirmed the CRC.
     End,
 }
 
 impl<'a> BlockDownload<'a> {
-    /// Writes an object of a node. No data at all is one segment that has none.
+    /// Writes an object of a node. Empty data is sent as one segment without bytes.
     #[must_use]
     pub fn new(node: NodeId, at: Multiplexer, data: &'a [u8], options: Options) -> BlockDownload<'a> {
         Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, futile: 0 }, node, at, options)
@@ -42,19 +42,19 @@ impl<'a> BlockDownload<'a> {
 }
 
 impl Protocol<'_> {
-    /// What comes after so many segments of the block.
+    /// The data that follows the first `sent` segments of the block.
     fn rest(&self, sent: u8) -> &[u8] {
         let offset = self.done.saturating_add(7 * usize::from(sent));
         self.data.get(offset..).unwrap_or(&[])
     }
 
-    /// How many segments the block has: as many as there are, up to the size that the server wants.
+    /// The number of segments in the block: the remaining ones, up to the block size of the server.
     fn len(&self, size: BlockSize) -> u8 {
         let segments = self.rest(0).len().div_ceil(7).max(1);
         u8::try_from(segments).map_or(size.get(), |segments| segments.min(size.get()))
     }
 
-    /// The server has the block up to this segment. What it does not have goes out again, in the next block.
+    /// The server has the block up to this segment. The remaining segments are sent again in the next block.
     fn acknowledge(&mut self, sequence: u8, next: BlockSize, link: &mut Link) -> Result<Progress, Error> {
         let is_all = 7 * usize::from(sequence) >= self.rest(0).len() && sequence > 0;
         self.done = self.done.saturating_add(7 * usize::from(sequence)).min(self.data.len());
@@ -88,7 +88,7 @@ impl transfer::Protocol for Protocol<'_> {
             BlockSegment { last: rest.len() <= 7, sequence, data: Bytes::from_slice(rest).padded() };
         self.phase = Phase::Block { size, sent: sequence.get() };
         if sequence.get() == self.len(size) {
-            // Two blocks of the same size have the same acknowledgement.
+            // Acknowledgements of two blocks of the same size are equal.
             link.expect_equal();
         }
         Some(segment.encode())

@@ -7,40 +7,40 @@ use super::{BlockUpload, Error, Options, upload};
 use crate::sdo::{BlockEnd, BlockSegment, Multiplexer, Request, Response, crc};
 use crate::{Duration, Instant, NodeId};
 
-/// A pause within a block means that its last segment was lost. Shorter than what servers grant the client.
+/// A pause of this length within a block means that its last segment was lost. The time-out of servers is longer.
 const PAUSE: Duration = Duration::from_millis(250);
-/// So many blocks in a row of which nothing arrives, and the transfer has failed.
+/// The transfer fails after this many blocks in a row without a segment in sequence.
 const FUTILE: u8 = 3;
 
 /// A block upload under way.
 #[derive(Debug)]
 pub struct Protocol<S> {
-    /// The sink, and the simpler transfer that a server may choose.
+    /// The sink, and the protocol without blocks, which a server may choose instead.
     simple: upload::Protocol<S>,
     phase: Phase,
-    /// The end will carry a CRC.
+    /// Whether the server will send a CRC at the end.
     has_crc: bool,
-    /// Bytes in all, where the server says so.
+    /// Total number of bytes, if the server announces it.
     size: Option<usize>,
-    /// The newest segment. How much of the last one is data, only the end says.
+    /// The newest segment. Only the end of the transfer tells how many bytes of the last segment are data.
     held: Option<[u8; 7]>,
     /// Bytes in the sink.
     received: usize,
     /// CRC of the bytes in the sink.
     crc: u16,
-    /// Blocks in a row of which nothing has arrived.
+    /// Blocks in a row without a segment in sequence.
     futile: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Phase {
-    /// The server has not said how it sends the data.
+    /// The server has not chosen the kind of transfer yet.
     Begin,
-    /// It has chosen the simpler transfer.
+    /// The server has chosen an expedited or segmented transfer.
     Simple,
-    /// Segments come, up to this one in sequence.
+    /// Segments are arriving; this one was the last in sequence.
     Block(u8),
-    /// All segments have come; the server has not said how much of the last one is data.
+    /// All segments have arrived; the server has not yet told how many bytes of the last one are data.
     End,
 }
 
@@ -61,7 +61,7 @@ impl<S: Sink> BlockUpload<S> {
         Transfer::with(protocol, node, at, options)
     }
 
-    /// The sink with what has come.
+    /// The sink with the received bytes.
     #[must_use]
     pub fn into_sink(self) -> S {
         self.protocol.simple.into_sink()
@@ -113,7 +113,7 @@ impl<S: Sink> Protocol<S> {
         Ok(Progress::Goes)
     }
 
-    /// Keeps a segment back; the one before it has turned out not to be the last.
+    /// Holds a segment back, and hands the segment before it to the sink: that one was not the last.
     fn hold(&mut self, data: [u8; 7]) -> Result<(), Error> {
         match self.held.replace(data) {
             Some(before) => self.append(&before),
@@ -130,7 +130,7 @@ impl<S: Sink> Protocol<S> {
         if self.simple.sink().append(data) { Ok(()) } else { Err(Error::TooLong) }
     }
 
-    /// The block is over. What did not come in sequence is sent again in the next one.
+    /// Acknowledges a block. The server sends segments that did not arrive in sequence again in the next block.
     fn acknowledge(&mut self, sequence: u8, is_all: bool, link: &mut Link) -> Result<(), Error> {
         self.futile = if sequence == 0 { self.futile.saturating_add(1) } else { 0 };
         if self.futile == FUTILE {
@@ -139,7 +139,7 @@ impl<S: Sink> Protocol<S> {
         self.phase = if is_all { Phase::End } else { Phase::Block(0) };
         let block_size = link.options.block_size.get();
         if block_size == 1 {
-            // All segments have the number 1: two may be equal.
+            // All segments have the number 1, so two segments in a row may be equal.
             link.expect_equal();
         }
         link.ask(Request::BlockAcknowledge { sequence, block_size });
@@ -148,7 +148,7 @@ impl<S: Sink> Protocol<S> {
 
     fn on_end(&mut self, end: BlockEnd, link: &mut Link) -> Result<Progress, Error> {
         let held = self.held.take().unwrap_or_default();
-        // Some servers say that a full last segment has 7 unused bytes. Where there is a size, it tells.
+        // Some servers report 7 unused bytes for a last segment that is full. The announced size, if any, decides.
         let is_full = end.unused == 7 && self.size == Some(self.received.saturating_add(7));
         let used = if is_full { 7 } else { 7 - usize::from(end.unused.min(7)) };
         self.append(held.get(..used).unwrap_or(&held))?;
@@ -186,7 +186,7 @@ impl<S: Sink> transfer::Protocol for Protocol<S> {
         }
     }
 
-    /// The last segments of a block are lost: what has come of it is acknowledged.
+    /// The last segments of a block are lost: acknowledges the segments that have arrived.
     fn on_silence(&mut self, link: &mut Link) -> Result<(), Error> {
         match self.phase {
             Phase::Block(sequence @ 1..) => self.acknowledge(sequence, false, link),

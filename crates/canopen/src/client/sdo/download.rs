@@ -12,7 +12,7 @@ pub struct Protocol<'a> {
     data: &'a [u8],
     /// Bytes that the server has acknowledged.
     done: usize,
-    /// The segment that waits for its acknowledgement; `None` while the first request does.
+    /// The segment that waits for its acknowledgement; `None` while the initiate request waits.
     segment: Option<Sent>,
 }
 

@@ -19,7 +19,7 @@ pub struct Protocol<S> {
 #[derive(Clone, Copy, Debug)]
 struct Segments {
     toggle: bool,
-    /// Bytes in all, where the server says so.
+    /// Total number of bytes, if the server announces it.
     size: Option<usize>,
 }
 
@@ -30,7 +30,7 @@ impl<S: Sink> Upload<S> {
         Transfer::with(Protocol::new(sink), node, at, options)
     }
 
-    /// The sink with what has come.
+    /// The sink with the received bytes.
     #[must_use]
     pub fn into_sink(self) -> S {
         self.protocol.into_sink()
@@ -50,12 +50,12 @@ impl<S: Sink> Protocol<S> {
         &mut self.sink
     }
 
-    /// Nothing has come yet.
+    /// Forgets the bytes received so far.
     pub(super) fn reset(&mut self) {
         (self.segments, self.received) = (None, 0);
     }
 
-    /// All of the data at once.
+    /// Takes the data of an expedited transfer.
     fn take_all(&mut self, bytes: &[u8]) -> Result<Progress, Error> {
         let fits = self.sink.begin(u32::try_from(bytes.len()).ok()) && self.sink.append(bytes);
         self.received = bytes.len();
@@ -72,7 +72,7 @@ impl<S: Sink> Protocol<S> {
         Ok(Progress::Goes)
     }
 
-    /// A segment without data that is not the last would go on for ever.
+    /// Takes a segment. An empty segment that is not the last one is refused: the transfer might never end.
     fn take(&mut self, segment: &Segment, now: Segments, link: &mut Link) -> Result<Progress, Error> {
         if segment.toggle != now.toggle {
             return Ok(Progress::Unfit);
