@@ -1,4 +1,4 @@
-//! TPDOs that tell events: the application has the events, and gives one whenever the TPDO may be sent.
+//! TPDOs that send events: the application keeps the events, and gives one whenever the TPDO may be sent.
 
 use super::full::Full;
 use super::{Application, STALE};
@@ -18,7 +18,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Sends what waits with the application, as far as it may be sent. When to ask again.
+    /// Sends the waiting events of the application as far as they may be sent. Returns when to call again.
     #[inline]
     pub(super) fn send_events(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
         if self.tells_events && self.basic.state.has_pdos() {
@@ -38,7 +38,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         due
     }
 
-    /// Whether an event of the TPDO was sent.
+    /// Sends one event of the TPDO, if the application has any. Returns whether an event was sent.
     fn tell_event(&mut self, place: usize, turn: &mut Turn<'_, impl Transmit>) -> bool {
         let Some(tpdo) = self.tpdos.get_mut(place) else { return false };
         let Some(number) = tpdo.asks_for_event(turn) else { return false };
@@ -47,7 +47,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         is_event
     }
 
-    /// A SYNC sends one event of each TPDO that the SYNC concerns.
+    /// Sends one event of each TPDO that the SYNC triggers.
     pub(super) fn send_events_with_sync(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Valid)) {

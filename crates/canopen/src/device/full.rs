@@ -13,7 +13,7 @@ use crate::sdo::Abort;
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, NodeId, Transmit, emcy, heartbeat, sync};
 
-/// All of a device but its services. The parameters are those of [`Device`](super::Device).
+/// A complete device without its services. The parameters are those of [`Device`](super::Device).
 #[derive(Debug)]
 pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> {
     pub(super) basic: Basic<A, [u8; N]>,
@@ -22,21 +22,21 @@ pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usiz
     pub(super) emcy: emcy::Producer,
     pub(super) tpdos: [Tpdo; T],
     pub(super) rpdos: [Rpdo; R],
-    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits: most frames for other nodes are not in
-    /// the set, and need no further look.
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
+    /// in the set and need no further check.
     pub(super) rpdo_filter: u32,
     pub(super) scanner: Scanner<M>,
-    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and place.
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
     pub(super) all_nodes: Option<(CanId, u16)>,
-    /// One of the TPDOs tells events.
+    /// Whether any TPDO sends events.
     pub(super) tells_events: bool,
-    /// Where the chains of PDOs begin.
+    /// The first PDOs of the chains.
     pub(super) first_tpdos: Links,
     pub(super) first_rpdos: Links,
     pub(super) jobs: store::Jobs,
-    /// The groups of which the defaults hold although values are stored.
+    /// The groups whose stored values could not be loaded: the defaults are in use.
     pub(super) lost: Groups,
-    /// The groups of which older values hold than those that were stored last.
+    /// The groups whose newest stored values could not be loaded: the values of the save before are in use.
     pub(super) older: Groups,
     pub(super) is_bus_off: bool,
 }
@@ -47,7 +47,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     type Application = A;
     type Image = [u8; N];
 
-    /// All PDOs of a SYNC, a heartbeat, an EMCY.
+    /// Free places for all PDOs of a SYNC, a heartbeat and an EMCY.
     const RESERVED_ROOM: usize = 10;
 
     fn new(dictionary: &'static Dictionary, node_id: Option<NodeId>, application: A) -> Self {

@@ -1,4 +1,4 @@
-//! LSS in the device: it works in every NMT state, and without a node-ID it is all there is.
+//! LSS in the device. LSS works in every NMT state; without a node-ID it is the only service.
 
 use super::body::Body;
 use super::{Action, STALE};
@@ -10,9 +10,9 @@ use crate::{Frame, Instant, NodeId, Transmit};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Switching {
     No,
-    /// The delay before it: nothing is sent, the bus becomes quiet.
+    /// The delay before the change. Nothing is sent until the bus is quiet.
     Before(Switch),
-    /// The delay after it: all others change too.
+    /// The delay after the change, until all other nodes have changed too.
     After,
 }
 
@@ -21,10 +21,10 @@ enum Switching {
 pub(super) struct Layer {
     slave: Slave,
     reply: [u8; 8],
-    /// When to try again, if the response found the queue full.
+    /// When to send the response again that found the queue full.
     reply_due: Instant,
     switching: Switching,
-    /// When the next step of the switching is due.
+    /// When the present delay is over.
     switching_due: Instant,
 }
 
@@ -53,7 +53,7 @@ impl Layer {
         self.slave.pending().node_id
     }
 
-    /// Whether the bit rate changes: nothing is sent then.
+    /// Whether a change of the bit rate is under way: nothing is sent during the change.
     pub(super) fn is_switching(&self) -> bool {
         self.switching != Switching::No
     }
@@ -80,7 +80,7 @@ impl Layer {
                 self.switching_due = turn.now + switch.delay();
                 None
             }
-            // The response waits for the end of the job.
+            // The response is sent at the end of the job.
             Outcome::Store(configuration) if body.store_configuration(configuration) => None,
             Outcome::Store(_) => Some(Slave::stored(false)),
         };
@@ -90,7 +90,7 @@ impl Layer {
         body.basic_mut().services_due = STALE;
     }
 
-    /// Sends a response. One that still waits is obsolete: its master has gone on.
+    /// Sends a response. It replaces a response that still waits: the master no longer expects the older one.
     pub(super) fn respond(&mut self, response: Response, turn: &mut Turn<'_, impl Transmit>) {
         self.reply = response.encode();
         self.send(turn);
@@ -102,14 +102,14 @@ impl Layer {
         self.reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
     }
 
-    /// Sends a response that found the queue full.
+    /// Sends the response again that found the queue full.
     pub(super) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         if turn.now >= self.reply_due {
             self.send(turn);
         }
     }
 
-    /// Goes on with a change of the bit rate. What was held back is sent after it.
+    /// Continues a change of the bit rate. Frames that were held back are sent after the change.
     pub(super) fn poll_switching(&mut self, now: Instant, body: &mut impl Body) {
         if now < self.switching_due {
             return;
@@ -123,7 +123,7 @@ impl Layer {
         };
     }
 
-    /// When `poll` or `poll_switching` has something to do.
+    /// The next deadline of `poll` or `poll_switching`.
     pub(super) fn due(&self) -> Instant {
         self.switching_due.min(self.reply_due)
     }

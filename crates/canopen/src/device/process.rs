@@ -9,7 +9,7 @@ use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
 impl<B: Body> Node<B> {
-    /// Takes a frame, whatever half it is for.
+    /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
@@ -17,7 +17,7 @@ impl<B: Body> Node<B> {
         self.services_next()
     }
 
-    /// Sends what is due in both halves.
+    /// Sends all frames that are due, in both halves.
     #[inline]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let _ = self.poll_process(now, out);
@@ -25,7 +25,7 @@ impl<B: Body> Node<B> {
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
-    // Inlined, so that a caller that drops a part of `Next` does not pay for it; the work itself is a function of its own.
+    // Inlined, so that a caller that ignores a part of `Next` does not pay for it. The work is in a separate function.
     #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
@@ -51,7 +51,7 @@ impl<B: Body> Node<B> {
         self.command(command);
     }
 
-    /// Sends what is due of process data.
+    /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().process_due {
@@ -65,8 +65,8 @@ impl<B: Body> Node<B> {
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Device<A, N, T, R, W, M>
 {
-    /// Lets the application update values in the image, and sends what their change triggers. The first call after a start
-    /// is the one with which a device that starts by itself (1F80h) becomes operational.
+    /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
+    /// starts by itself (1F80h), its first call after a start makes the device operational.
     pub fn publish(
         &mut self,
         now: Instant,
@@ -78,8 +78,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.process_next()
     }
 
-    /// Sends a TPDO of type 254 or 255 now, or as soon as its inhibit time is over: an event that the application has
-    /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
+    /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
+    /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.services.turn(now, out);
         let place = self.body.tpdo_place(tpdo);
@@ -112,8 +112,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.own_process_ids().chain(all_nodes)
     }
 
-    /// The identifiers as acceptance filters: each with a mask of the bits to compare. With an RPDO for all nodes
-    /// ([`Application::takes_all_nodes`]) they are fewer by far.
+    /// The identifiers as acceptance filters: each with a mask of the bits to compare. If an RPDO takes the frames of
+    /// all nodes ([`Application::takes_all_nodes`]), there are far fewer filters than identifiers.
     pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
         let all_nodes = self.body.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
         self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
@@ -143,7 +143,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Visits the TPDOs of a chain. What one of them could not send at once moves the next deadline.
+    /// Visits the TPDOs of a chain. A TPDO that could not be sent at once makes the process data due.
     pub(super) fn each_tpdo(&mut self, chain: Chain, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.get_mut(links.next(chain)) {

@@ -1,4 +1,4 @@
-//! Services: the SDO server, the heartbeat and LSS, and when each of them is due.
+//! Services: the SDO server, the heartbeat and LSS, and their deadlines.
 
 use super::body::Body;
 use super::lss::Layer;
@@ -14,15 +14,16 @@ const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
 
-/// The SDO server and the LSS slave of a device, with the responses that wait for the queue.
+/// The SDO server and the LSS slave of a device, with the responses that wait for room in the queue.
 #[derive(Debug)]
 pub(super) struct Services {
     server: Server,
-    /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is none.
+    /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is not a
+    /// request.
     sdo_request: FullFrameId,
-    /// When to try again to send a reply of the server that found the queue full.
+    /// When to send a reply of the server again that found the queue full.
     reply_due: Instant,
-    /// When to go on with a block that found the queue full.
+    /// When to continue a block that found the queue full.
     block_due: Instant,
     lss: Layer,
 }
@@ -42,7 +43,7 @@ impl Services {
         self.lss.set_bit_rate(bit_rate);
     }
 
-    /// A reset of the device; the node-ID with which the device starts.
+    /// Resets the services. Returns the node-ID with which the device starts.
     pub(super) fn restart(&mut self) -> Option<NodeId> {
         self.forget_transfer();
         self.lss.restart();
@@ -55,13 +56,14 @@ impl Services {
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
     }
 
-    /// One call. The way to the queue is shut while the bit rate changes.
+    /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
+    /// nothing.
     pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
         Turn { now, out, is_open: !self.lss.is_switching() }
     }
 }
 
-/// The CAN-ID of requests to the SDO server; that of no device without a node-ID.
+/// The CAN-ID of requests to the SDO server. Without a node-ID, the CAN-ID for node-ID 0, which no client uses.
 fn sdo_request(node_id: Option<NodeId>) -> FullFrameId {
     CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get)).into()
 }
@@ -77,7 +79,7 @@ impl<B: Body> Node<B> {
         self.services_next()
     }
 
-    /// Sends what is due of the services, and hands over what is left to the caller.
+    /// Sends the frames of the services that are due, and returns a waiting action.
     #[inline]
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().services_due {
@@ -92,7 +94,8 @@ impl<B: Body> Node<B> {
         [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
     }
 
-    /// Takes a frame if it is a segment of a block from which nothing follows. Without SDO, no transfer is under way.
+    /// Takes a frame if it is a block segment that needs no further processing. Called in any state: without SDO, there
+    /// is no transfer.
     #[inline]
     fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
         let request = frame.full(self.services.sdo_request);
@@ -123,18 +126,18 @@ impl<B: Body> Node<B> {
         if !server.is_idle() {
             self.body.basic_mut().serve_until(server.deadline());
         }
-        // Only a request without a reply starts a block.
+        // Only a request without a reply can start a block.
         if has_reply {
             return self.respond(turn);
         }
-        // A reply that still waits is obsolete: its client has gone on.
+        // A reply that still waits is obsolete: the client has sent its next request.
         *reply_due = Instant::NEVER;
         if B::Application::BLOCK_UPLOAD && server.is_sending() {
             self.send_block(turn);
         }
     }
 
-    /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
+    /// Sends segments of a block upload while the queue has plenty of room: a transfer must not delay PDOs.
     #[inline(never)]
     fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let id = self.body.basic().service(SDO_RESPONSE);
@@ -163,7 +166,7 @@ impl<B: Body> Node<B> {
         }
     }
 
-    /// A job has come to its end: whoever waits for the end is answered, the LSS master if `lss_waits`.
+    /// A job is finished: answers the SDO client that waits for it, and the LSS master if `lss_waits`.
     pub(super) fn finish_job(
         &mut self,
         result: Result<(), Abort>,
@@ -179,7 +182,7 @@ impl<B: Body> Node<B> {
         self.body.basic_mut().services_due = STALE;
     }
 
-    /// A transfer does not survive a state without SDO.
+    /// Forgets the transfer in a state without SDO.
     pub(super) fn silence_services(&mut self) {
         if !self.body.basic().state.has_services() {
             self.services.forget_transfer();
@@ -220,7 +223,7 @@ impl<B: Body> Node<B> {
             return lss;
         }
         let due = lss.min(basic.heartbeat.due()).min(self.body.errors_due());
-        // Without SDO, no transfer is under way, and nothing of the three is due.
+        // In a state without SDO there is no transfer, and none of these three deadlines is set.
         due.min(services.server.deadline()).min(services.reply_due).min(services.block_due)
     }
 }

@@ -1,4 +1,4 @@
-//! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and what follows from a SYNC.
+//! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and the reaction to a SYNC.
 
 use super::body::Body;
 use super::full::Full;
@@ -46,7 +46,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.basic.process_due = self.basic.process_due.min(self.sync.due());
     }
 
-    /// Looks for a SYNC that is missing, and drops what the synchronous window no longer lets out.
+    /// Detects a missing SYNC, and drops TPDOs that were not sent within the synchronous window.
     pub(super) fn poll_sync(&mut self, now: Instant) {
         if self.sync.expire(now) {
             self.raise(Fault::SyncMissing, now);
