@@ -1,5 +1,5 @@
-//! The filling of the run-time tables. What is in them already is not put there again: places of the same shape, equal
-//! attributes, and default values that follow each other somewhere as they are needed.
+//! Builds the run-time tables without duplicates: objects of the same shape share their places, entries share equal
+//! attributes, and a sequence of default values is stored once.
 #![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use super::compile::{effective_limits, event_timer, object_len, series_len};
@@ -8,7 +8,7 @@ use super::limits::Limits;
 use super::tables::{Place, Series};
 use super::{Counts, DefaultValue, Group, Object, Rule, image_size};
 
-/// Room for tables, and how much of it is filled.
+/// Tables of maximum size, and the number of used elements.
 pub(super) struct Filling {
     pub(super) series: [Series; MOST],
     pub(super) places: [Place; MOST],
@@ -17,15 +17,15 @@ pub(super) struct Filling {
     pub(super) filled: Counts,
 }
 
-/// More series or places than these do not compile.
+/// The maximum number of series and of places. A larger table does not compile.
 const MOST: usize = 1024;
-/// As large as the largest image.
+/// The maximum number of default bytes: the size of the largest image.
 const MOST_DEFAULTS: usize = 1 << 16;
-/// A place names its attributes in a byte.
+/// The maximum number of attributes: a place refers to its attributes by one byte.
 const MOST_ATTRIBUTES: usize = 256;
 
-#[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges, and there is no room for more numbers.
-#[allow(clippy::large_stack_arrays)] // It is filled during compilation.
+#[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
+#[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
 impl Filling {
     pub(super) const fn of(all: &[&[Object]]) -> Filling {
         let mut filling = Filling {
@@ -54,7 +54,8 @@ impl Filling {
         }
     }
 
-    /// Objects of so many entries among `all` rows, the first at this place in the image.
+    /// Adds a series. `rows` are the rows of its objects, `entries` the number of rows per object, `offset` the offset
+    /// of the first object in the image. `all` is the whole table, for the event timers that other entries refer to.
     const fn add_series(&mut self, all: &[Object], rows: &[Object], entries: usize, offset: u16) {
         let given = self.write_defaults(rows);
         self.series[self.filled.series] = Series {
@@ -69,7 +70,8 @@ impl Filling {
         self.filled.series += 1;
     }
 
-    /// The number of the first of them: where the same places have been before, or behind all others.
+    /// Adds the places of an object. Returns the number of the first one, which may be an equal sequence already
+    /// stored.
     const fn add_places(&mut self, all: &[Object], object: &[Object], start_of_object: u16) -> usize {
         let (start, mut row, mut next) = (self.filled.places, 0, 0);
         while row < object.len() {
@@ -92,7 +94,7 @@ impl Filling {
         first
     }
 
-    /// Whether the places from `first` on are those from `start` on.
+    /// Whether the `len` places from `first` on are equal to the places from `start` on.
     const fn has_places(&self, first: usize, start: usize, len: usize) -> bool {
         let mut i = 0;
         while i < len {
@@ -115,7 +117,7 @@ impl Filling {
         number
     }
 
-    /// Writes default values behind all others; gives their number without the zeros at the end.
+    /// Writes default values after all stored ones. Returns their number without the zeros at the end.
     const fn write_defaults(&mut self, rows: &[Object]) -> usize {
         let (mut at, mut given, mut row) = (0, 0, 0);
         while row < rows.len() {
@@ -131,7 +133,8 @@ impl Filling {
         given
     }
 
-    /// The number of the first of those that have been written: where the same values have been before, or where they are.
+    /// Stores the `given` default values just written. Returns the number of the first one, which may be an equal
+    /// sequence already stored.
     const fn add_defaults(&mut self, given: usize) -> usize {
         let (start, mut first) = (self.filled.defaults, 0);
         while !self.has_defaults(first, start, given) {
@@ -141,7 +144,7 @@ impl Filling {
         first
     }
 
-    /// Whether the values from `first` on are those from `start` on.
+    /// Whether the `len` values from `first` on are equal to the values from `start` on.
     const fn has_defaults(&self, first: usize, start: usize, len: usize) -> bool {
         let mut i = 0;
         while i < len && self.defaults[first + i] == self.defaults[start + i] {
@@ -166,7 +169,7 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.node_relative == b.node_relative
 }
 
-/// A number for a group, as constant functions cannot compare groups.
+/// A number for each group: constant functions cannot compare groups.
 pub(super) const fn group_code(group: Option<Group>) -> u8 {
     match group {
         None => u8::MAX,
