@@ -1,8 +1,9 @@
-//! The producer of a multiplexed TPDO: it watches objects and sends those that change.
+//! The producer of a multiplexed TPDO: monitors objects and sends their changes.
 //!
-//! In destination address mode these are all objects that can be mapped and that no other TPDO carries, sent to all
-//! nodes; in source address mode those of the object scanner list. With an event timer the timer alone sends, all of
-//! them; without one, each change does. Entering Operational sends all in both cases.
+//! In destination address mode, the objects are all mappable objects that no other TPDO maps, and they are sent to all
+//! nodes. In source address mode, they are the objects of the object scanner list. With an event timer, only the timer
+//! triggers the transmission, always of all objects. Without one, each changed object is sent. Entering Operational
+//! sends all objects in both cases.
 
 use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
@@ -33,14 +34,14 @@ impl ScannerSettings {
     }
 }
 
-/// An object that is watched.
+/// A monitored object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Watched {
     at: Multiplexer,
     field: Field,
     /// The value that was sent last; `None` before the first transmission.
     sent: Option<[u8; 4]>,
-    /// No other TPDO carries it, and its part of the device is there.
+    /// Whether the object is sent: no other TPDO maps the object, and the application broadcasts it.
     is_own: bool,
     /// The value waits to be sent.
     is_pending: bool,
@@ -60,12 +61,12 @@ impl Watched {
     }
 }
 
-/// The producer, with room for `M` objects. Without settings there is none.
+/// The producer of the multiplexed TPDO, with room for `M` objects. Without settings it sends nothing.
 #[derive(Debug)]
 pub(crate) struct Scanner<const M: usize> {
     settings: Option<ScannerSettings>,
     watched: Vec<Watched, M>,
-    /// Some of them are to be sent.
+    /// Whether any object waits to be sent.
     is_pending: bool,
     event_due: Instant,
     inhibited_until: Instant,
@@ -82,43 +83,44 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
-    /// Whether it has these settings already.
+    /// Whether the present settings are equal to these.
     pub(crate) fn has(&self, settings: Option<ScannerSettings>) -> bool {
         self.settings == settings
     }
 
-    /// Takes new settings. It watches nothing then.
+    /// Takes new settings, and removes all monitored objects.
     pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
         self.settings = settings;
         self.watched.clear();
         self.stop();
     }
 
-    /// Watches one more object; what is beyond its room is left out.
+    /// Monitors one more object. Objects beyond the room are ignored.
     pub(crate) fn watch(&mut self, watched: Watched) {
         let _ = self.watched.push(watched);
     }
 
-    /// Watches of its objects those that are to be told; one that is told for the first time is sent.
+    /// Selects the objects to send. An object that is selected for the first time is sent.
     pub(crate) fn choose(&mut self, is_told: impl Fn(Multiplexer) -> bool) {
         self.watched.iter_mut().for_each(|watched| watched.is_own = is_told(watched.at));
     }
 
-    /// Forgets the sent values of objects that are no longer sent: one that is chosen again later is sent as new.
+    /// Forgets the sent values of objects that are not selected, so that they are sent as new if they are selected
+    /// again.
     pub(crate) fn forget_others(&mut self) {
         for watched in self.watched.iter_mut().filter(|watched| !watched.is_own) {
             (watched.sent, watched.is_pending) = (None, false);
         }
     }
 
-    /// No longer watches what a TPDO carries.
+    /// Deselects the objects that a TPDO maps.
     pub(crate) fn leave_out(&mut self, layout: &Layout) {
         for watched in &mut self.watched {
             watched.is_own &= !layout.contains(watched.field);
         }
     }
 
-    /// Entering Operational.
+    /// Sends all objects, on entering Operational.
     pub(crate) fn start(&mut self) {
         self.stop();
         if self.settings.is_some() {
@@ -134,18 +136,18 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
-    /// Leaving Operational.
+    /// Discards everything that waits, on leaving Operational.
     pub(crate) fn stop(&mut self) {
         self.watched.iter_mut().for_each(|watched| watched.is_pending = false);
         (self.is_pending, self.event_due, self.inhibited_until) = (false, Instant::NEVER, Instant(0));
     }
 
-    /// The next instant at which something is due.
+    /// When the next frame or the event timer is due.
     pub(crate) fn due(&self) -> Instant {
         if self.is_pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
     }
 
-    /// Watched values may have changed.
+    /// Sends the objects whose value has changed.
     pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
@@ -157,7 +159,7 @@ impl<const M: usize> Scanner<M> {
         self.poll(image, turn);
     }
 
-    /// Sends what is due: one after the other, as the inhibit time and the queue allow.
+    /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
     pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = self.settings else { return };
         let elapsed = turn.now >= self.event_due;
@@ -175,7 +177,8 @@ impl<const M: usize> Scanner<M> {
                 return;
             }
             let data = watched.value(image);
-            // The next message has the same identifier and another object, so none takes the place of another.
+            // All these frames have the same identifier but different objects: no frame may replace another in the
+            // queue.
             if !turn.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
                 self.inhibited_until = turn.now + RETRY;
                 return;

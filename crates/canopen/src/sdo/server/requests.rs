@@ -1,4 +1,4 @@
-//! What the server does with each request.
+//! The reaction of the server to each request.
 
 use super::{Answer, Server, Transfer};
 use crate::Instant;
@@ -12,7 +12,7 @@ use crate::sdo::{
 };
 
 impl Server {
-    /// A request that is no segment of a block; `is_repeated` for the same as the one before.
+    /// Takes a request that is not a segment of a block. `is_repeated` is `true` if it is equal to the request before.
     #[inline]
     pub(super) fn dispatch<O: Objects>(
         &mut self,
@@ -22,14 +22,15 @@ impl Server {
         now: Instant,
     ) -> Answer {
         let Some(request) = Request::parse(frame) else {
-            // No transfer is under way: the abort names the object of this frame, and not that of the last transfer.
+            // Without a transfer, the abort message names the object of this frame instead of the last transfer's
+            // object.
             if self.is_idle() {
                 self.multiplexer = Multiplexer::parse(frame);
             }
             return Err(Abort::Command);
         };
         match request {
-            // `answer` hands these to functions of their own.
+            // `answer` handles these two.
             Request::Upload(_) | Request::Download(..) => Err(Abort::Command),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
             Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
@@ -54,7 +55,7 @@ impl Server {
                     None => Ok(false),
                 }
             }
-            // The confirmation of the end is not answered; one that was refused is refused again.
+            // A confirmation has no answer, so a repetition is ignored. A refused confirmation is refused again.
             Request::BlockUploadEnded if is_repeated && !self.is_answered => Ok(false),
             Request::BlockUploadEnded => {
                 self.sender()?.ended()?;
@@ -64,7 +65,7 @@ impl Server {
         }
     }
 
-    /// The request that begins a download.
+    /// Takes the request that begins a download.
     #[inline(never)]
     pub(super) fn initiate_download(
         &mut self,
@@ -74,7 +75,7 @@ impl Server {
     ) -> bool {
         let at = Multiplexer::parse(frame);
         self.begin(at);
-        // Most writes are of this kind: the data are taken straight from the frame.
+        // Most downloads are expedited: their data is used directly from the frame.
         let result = match Initiate::expedited(frame) {
             Some(data) => objects.write(at, data, now),
             None => self.download(at, frame, objects, now),
@@ -83,7 +84,7 @@ impl Server {
         self.conclude(answer, objects, now)
     }
 
-    /// The request that begins an upload.
+    /// Takes the request that begins an upload.
     #[inline(never)]
     pub(super) fn initiate_upload(
         &mut self,
@@ -95,7 +96,7 @@ impl Server {
         self.settle(answer, now)
     }
 
-    /// A new transfer; one that was under way is forgotten, as its client has started over.
+    /// Begins a transfer. A transfer that is under way is forgotten: its client has started over.
     fn begin(&mut self, at: Multiplexer) {
         self.transfer = Transfer::Idle;
         self.multiplexer = at;
@@ -181,7 +182,7 @@ impl Server {
         Ok(self.say(Response::BlockDownloaded))
     }
 
-    /// A value of no more than `threshold` bytes goes by the simpler transfers.
+    /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
     fn block_upload(
         &mut self,
         at: Multiplexer,
@@ -207,7 +208,7 @@ impl Server {
     }
 }
 
-/// The value of an expedited download that leaves its size to the type.
+/// The value of an expedited download without a size. The size is taken from the data type.
 fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
     match objects.writable(at)? {
         Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),
