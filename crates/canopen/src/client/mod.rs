@@ -26,8 +26,8 @@
 //!         }
 //!     }
 //!
-//!     /// The next frame; `None` when there was none until then.
 //!     /// The next frame; `None` when no frame arrives until then.
+//!     fn receive(&mut self, until: Instant) -> Option<Frame> {
 //!         let frame = self.answer.take();
 //!         self.now = if frame.is_some() { self.now } else { until };
 //!         frame
