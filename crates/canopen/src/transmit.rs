@@ -49,13 +49,13 @@ pub trait Transmit {
 
 /// One call of the device: its time and the transmit queue. While the bit rate changes, the queue is closed: it accepts
 /// no frame, and the senders try again later.
-pub struct Turn<'a, T> {
+pub struct Context<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
 }
 
-impl<T: Transmit> Turn<'_, T> {
+impl<T: Transmit> Context<'_, T> {
     /// Queues a frame. `false` when there is no room.
     pub(crate) fn send(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send(frame).is_ok()

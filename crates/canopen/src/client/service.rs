@@ -39,7 +39,7 @@ pub enum Taken {
     Ignored,
     /// The frame comes from the right device but does not fit the state of the service, such as a late answer to an
     /// earlier request. If no fitting answer follows, the service reports that the device does not follow the protocol.
-    Unfit,
+    Unexpected,
 }
 
 /// The instant `span` after `now`; `NEVER` when the sum is too large.

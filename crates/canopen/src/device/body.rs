@@ -6,7 +6,7 @@ use crate::dictionary::{Dictionary, Entry};
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// A device without its services. The default of every method is the behaviour of the inner device; the outer device
@@ -57,10 +57,10 @@ pub trait Body: Sized {
     fn configure(&mut self, _now: Instant) {}
 
     /// Takes a frame that is neither NMT nor for the services. Called in states with PDOs only.
-    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut Turn<'_, impl Transmit>) {}
+    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut Context<'_, impl Transmit>) {}
 
     /// Sends the process data that is due.
-    fn send_process(&mut self, _turn: &mut Turn<'_, impl Transmit>) {
+    fn send_process(&mut self, _turn: &mut Context<'_, impl Transmit>) {
         self.basic_mut().process_due = Instant::NEVER;
     }
 
@@ -68,7 +68,7 @@ pub trait Body: Sized {
     fn on_heartbeat(&mut self, _frame: &Frame, _now: Instant) {}
 
     /// Checks for due work other than SDO, LSS and the heartbeat of the device.
-    fn poll_errors(&mut self, _turn: &mut Turn<'_, impl Transmit>) {}
+    fn poll_errors(&mut self, _turn: &mut Context<'_, impl Transmit>) {}
 
     /// The next deadline of `poll_errors`.
     fn errors_due(&self) -> Instant {
@@ -86,7 +86,7 @@ pub trait Body: Sized {
     }
 
     /// Applies the new value of an entry with a rule.
-    fn follow(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
+    fn value_written(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
 
     /// An SDO client has written the entry: stores the groups that the application wants stored at once.
     fn store_at_once(&mut self, _entry: &Entry) -> Result<(), Abort> {

@@ -10,7 +10,7 @@ use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
 use crate::sdo::Abort;
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, NodeId, Transmit, emcy, heartbeat, sync};
 
 /// A complete device without its services. The parameters are those of [`Device`](super::Device).
@@ -29,7 +29,7 @@ pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usiz
     /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
     pub(super) all_nodes: Option<(CanId, u16)>,
     /// Whether any TPDO sends events.
-    pub(super) tells_events: bool,
+    pub(super) sends_events: bool,
     /// The first PDOs of the chains.
     pub(super) first_tpdos: Links,
     pub(super) first_rpdos: Links,
@@ -62,7 +62,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             rpdo_filter: 0,
             scanner: Scanner::new(),
             all_nodes: None,
-            tells_events: false,
+            sends_events: false,
             first_tpdos: Links::END,
             first_rpdos: Links::END,
             jobs: store::Jobs::new(),
@@ -115,17 +115,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.report_stored(now);
         self.update_error_register();
         if self.basic().number(0x1F80, 0) == SELF_START {
-            self.basic.pending.with_values = Some(State::Operational);
+            self.basic.pending.self_start_state = Some(State::Operational);
         }
     }
 
-    fn on_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
-        self.take_pdo_frame(frame, turn);
+    fn on_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+        self.take_pdo_frame(frame, context);
     }
 
-    fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.basic.process_due {
-            self.run_process(turn);
+    fn send_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now >= self.basic.process_due {
+            self.run_process(context);
         }
     }
 
@@ -133,13 +133,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.take_heartbeat(frame, now);
     }
 
-    fn poll_errors(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        while let Some(change) = self.watches.expire(turn.now) {
-            self.on_watch(change, turn.now);
+    fn poll_errors(&mut self, context: &mut Context<'_, impl Transmit>) {
+        while let Some(change) = self.watches.expire(context.now) {
+            self.on_watch(change, context.now);
             self.apply_error(ErrorClass::COMMUNICATION);
         }
         if self.basic.state.has_services() {
-            self.emcy.poll(turn);
+            self.emcy.poll(context);
         }
     }
 
@@ -160,8 +160,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.admit_value(entry, value)
     }
 
-    fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.follow_value(entry, value, now);
+    fn value_written(&mut self, entry: &Entry, value: u32, now: Instant) {
+        self.apply_value(entry, value, now);
     }
 
     fn store_at_once(&mut self, entry: &Entry) -> Result<(), Abort> {

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::{Action, STALE};
 use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{Frame, Instant, NodeId, Transmit};
 
 /// A change of the bit rate (CiA 305, activate bit timing parameters).
@@ -18,7 +18,7 @@ enum Switching {
 
 /// The LSS slave and its last response.
 #[derive(Debug)]
-pub(super) struct Layer {
+pub(super) struct LssSlave {
     slave: Slave,
     reply: [u8; 8],
     /// When to send the response again that found the queue full.
@@ -28,9 +28,9 @@ pub(super) struct Layer {
     switching_due: Instant,
 }
 
-impl Layer {
-    pub(super) fn new(node_id: Option<NodeId>) -> Layer {
-        Layer {
+impl LssSlave {
+    pub(super) fn new(node_id: Option<NodeId>) -> LssSlave {
+        LssSlave {
             slave: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
             reply: [0; 8],
             reply_due: Instant::NEVER,
@@ -62,7 +62,7 @@ impl Layer {
     pub(super) fn take_frame(
         &mut self,
         frame: &Frame,
-        turn: &mut Turn<'_, impl Transmit>,
+        context: &mut Context<'_, impl Transmit>,
         body: &mut impl Body,
     ) {
         let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
@@ -71,13 +71,13 @@ impl Layer {
         let response = match self.slave.take(request, &identity, basic.node_id) {
             Outcome::Silence => None,
             Outcome::Answer(response) => Some(response),
-            Outcome::Join => {
-                basic.begin_join();
+            Outcome::BootUp => {
+                basic.request_boot_up();
                 None
             }
             Outcome::Switch(switch) => {
                 self.switching = Switching::Before(switch);
-                self.switching_due = turn.now + switch.delay();
+                self.switching_due = context.now + switch.delay();
                 None
             }
             // The response is sent at the end of the job.
@@ -85,27 +85,27 @@ impl Layer {
             Outcome::Store(_) => Some(Slave::stored(false)),
         };
         if let Some(response) = response {
-            self.respond(response, turn);
+            self.respond(response, context);
         }
         body.basic_mut().services_due = STALE;
     }
 
     /// Sends a response. It replaces a response that still waits: the master no longer expects the older one.
-    pub(super) fn respond(&mut self, response: Response, turn: &mut Turn<'_, impl Transmit>) {
+    pub(super) fn respond(&mut self, response: Response, context: &mut Context<'_, impl Transmit>) {
         self.reply = response.encode();
-        self.send(turn);
+        self.send(context);
     }
 
     #[inline(never)]
-    fn send(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let is_sent = turn.send(Frame::data_frame(RESPONSE, 8, self.reply));
-        self.reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
+    fn send(&mut self, context: &mut Context<'_, impl Transmit>) {
+        let is_sent = context.send(Frame::data_frame(RESPONSE, 8, self.reply));
+        self.reply_due = if is_sent { Instant::NEVER } else { context.now + RETRY };
     }
 
     /// Sends the response again that found the queue full.
-    pub(super) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.reply_due {
-            self.send(turn);
+    pub(super) fn poll(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now >= self.reply_due {
+            self.send(context);
         }
     }
 

@@ -33,7 +33,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         if addressing == Some(Addressing::Destination) {
-            self.choose_watched();
+            self.select_watched();
         }
         if is_new && self.basic.state.has_pdos() {
             self.scanner.start();
@@ -49,11 +49,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Selects the objects to send: the application broadcasts them, and no TPDO maps them. A TPDO that is switched off
     /// counts too: switching it off must not send its objects in another frame.
-    fn choose_watched(&mut self) {
+    fn select_watched(&mut self) {
         let (application, image) = (&self.basic.application, &self.basic.image);
-        self.scanner.choose(|at| application.broadcasts(at, image));
-        self.leave_out_mapped();
-        self.scanner.forget_others();
+        self.scanner.select(|at| application.broadcasts(at, image));
+        self.deselect_mapped();
+        self.scanner.forget_deselected();
     }
 
     /// Monitors the objects of the scanner list. Each line is a block of sub-indexes of one object.

@@ -99,7 +99,7 @@ fn write_by_rule(
     if rule == Rule::HeartbeatTime {
         basic.heartbeat.set_period(low_half(value), now);
     }
-    body.follow(entry, value, now);
+    body.value_written(entry, value, now);
     let basic = body.basic_mut();
     (basic.process_due, basic.services_due) = (STALE, STALE);
     Ok(())
@@ -133,9 +133,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Hands a new value to the protocol that uses it.
-    pub(super) fn follow_value(&mut self, entry: &Entry, value: u32, now: Instant) {
+    pub(super) fn apply_value(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
-            Rule::Application => self.follow_application(now),
+            Rule::Application => self.apply_application_changes(now),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);

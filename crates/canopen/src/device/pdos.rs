@@ -80,7 +80,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Reconfigures the PDOs that the application has switched on or off.
-    pub(super) fn follow_application(&mut self, now: Instant) {
+    pub(super) fn apply_application_changes(&mut self, now: Instant) {
         let mut has_changed = false;
         for direction in [Direction::Transmit, Direction::Receive] {
             for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
@@ -155,7 +155,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Links the valid PDOs to chains, after a change of their settings.
     fn link_pdos(&mut self) {
         (self.first_tpdos, self.first_rpdos) = (Links::END, Links::END);
-        self.tells_events = self.tpdos.iter().any(|tpdo| tpdo.events_of().is_some());
+        self.sends_events = self.tpdos.iter().any(|tpdo| tpdo.events_of().is_some());
         for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
@@ -235,10 +235,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Excludes the objects of all TPDOs, valid or not, from the multiplexed TPDO.
-    pub(super) fn leave_out_mapped(&mut self) {
+    pub(super) fn deselect_mapped(&mut self) {
         for pdo in Pdo::all(self.basic.dictionary, Direction::Transmit) {
             if let Some(Content::Objects(layout)) = self.content(pdo) {
-                self.scanner.leave_out(&layout);
+                self.scanner.deselect(&layout);
             }
         }
     }

@@ -5,7 +5,7 @@ use super::full::Full;
 use super::{Application, Device, Next, Node, STALE};
 use crate::nmt::Command;
 use crate::pdo::{Chain, Rpdo, Tpdo};
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, Transmit};
 
 impl<B: Body> Node<B> {
@@ -34,13 +34,13 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let turn = &mut self.services.turn(now, out);
+        let context = &mut self.services.context(now, out);
         if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame);
         } else if self.body.basic().state.has_pdos() {
-            self.body.on_pdo_frame(frame, turn);
+            self.body.on_pdo_frame(frame, context);
         }
-        self.body.send_process(turn);
+        self.body.send_process(context);
     }
 
     #[inline(never)]
@@ -55,8 +55,8 @@ impl<B: Body> Node<B> {
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().process_due {
-            let turn = &mut self.services.turn(now, out);
-            self.body.send_process(turn);
+            let context = &mut self.services.context(now, out);
+            self.body.send_process(context);
         }
         self.process_next()
     }
@@ -81,7 +81,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
-        let turn = &mut self.services.turn(now, out);
+        let context = &mut self.services.context(now, out);
         let place = self.body.tpdo_place(tpdo);
         if self.body.basic.state.has_pdos()
             && let Some(tpdo) = place.and_then(|place| self.body.tpdos.get_mut(usize::from(place)))
@@ -89,21 +89,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             tpdo.on_event();
             self.body.basic.process_due = STALE;
         }
-        self.body.send_process(turn);
+        self.body.send_process(context);
         self.process_next()
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
-        let turn = &mut self.services.turn(now, out);
-        self.start_by_itself(turn);
+        let context = &mut self.services.context(now, out);
+        self.self_start(context);
         if self.body.basic.state.has_pdos() {
-            self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, turn));
-            let events_due = self.body.send_events(turn);
-            self.body.scanner.on_change(&self.body.basic.image, turn);
+            self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
+            let events_due = self.body.send_events(context);
+            self.body.scanner.on_change(&self.body.basic.image, context);
             self.body.basic.process_due =
                 self.body.basic.process_due.min(self.body.scanner.due()).min(events_due);
         }
-        self.body.send_process(turn);
+        self.body.send_process(context);
     }
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
@@ -129,17 +129,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
         if self.sync.accepts(frame) {
-            self.on_sync(frame, turn);
+            self.on_sync(frame, context);
         } else if frame.is_remote() {
             self.each_tpdo(Chain::Valid, |tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
-                    tpdo.on_remote(image, turn);
+                    tpdo.on_remote(image, context);
                 }
             });
         } else {
-            self.on_rpdo(frame, turn.now);
+            self.on_rpdo(frame, context.now);
         }
     }
 
@@ -156,15 +156,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     #[inline(never)]
-    pub(super) fn run_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        self.poll_sync(turn.now);
-        let mut due = self.poll_rpdos(turn.now);
+    pub(super) fn run_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+        self.poll_sync(context.now);
+        let mut due = self.poll_rpdos(context.now);
         self.each_tpdo(Chain::Valid, |tpdo, image| {
-            tpdo.poll(image, turn);
+            tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });
-        due = due.min(self.send_events(turn));
-        self.scanner.poll(&self.basic.image, turn);
+        due = due.min(self.send_events(context));
+        self.scanner.poll(&self.basic.image, context);
         self.basic.process_due = due.min(self.scanner.due()).min(self.sync.due());
     }
 }

@@ -1,12 +1,12 @@
 //! Services: the SDO server, the heartbeat and LSS, and their deadlines.
 
 use super::body::Body;
-use super::lss::Layer;
+use super::lss::LssSlave;
 use super::{Application as _, Next, Node, STALE};
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::sdo::{Abort, Server};
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
@@ -25,7 +25,7 @@ pub(super) struct Services {
     reply_due: Instant,
     /// When to continue a block that found the queue full.
     block_due: Instant,
-    lss: Layer,
+    lss: LssSlave,
 }
 
 impl Services {
@@ -35,7 +35,7 @@ impl Services {
             sdo_request: sdo_request(node_id),
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
-            lss: Layer::new(node_id),
+            lss: LssSlave::new(node_id),
         }
     }
 
@@ -58,8 +58,8 @@ impl Services {
 
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
-    pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
-        Turn { now, out, is_open: !self.lss.is_switching() }
+    pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
+        Context { now, out, is_open: !self.lss.is_switching() }
     }
 }
 
@@ -106,11 +106,11 @@ impl<B: Body> Node<B> {
     pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         if let Some(request) = frame.full(self.services.sdo_request) {
             if self.body.basic().state.has_services() {
-                self.on_request(request, &mut self.services.turn(now, out));
+                self.on_request(request, &mut self.services.context(now, out));
             }
         } else if frame.id() == lss::REQUEST.get() {
-            let turn = &mut self.services.turn(now, out);
-            self.services.lss.take_frame(frame, turn, &mut self.body);
+            let context = &mut self.services.context(now, out);
+            self.services.lss.take_frame(frame, context, &mut self.body);
         } else if frame.id() & 0x780 == ERROR_CONTROL {
             self.body.on_heartbeat(frame, now);
         }
@@ -120,48 +120,48 @@ impl<B: Body> Node<B> {
     }
 
     #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn on_request(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>) {
+    fn on_request(&mut self, request: &[u8; 8], context: &mut Context<'_, impl Transmit>) {
         let Services { server, reply_due, .. } = &mut self.services;
-        let has_reply = server.answer(request, &mut self.body, turn.now);
+        let has_reply = server.answer(request, &mut self.body, context.now);
         if !server.is_idle() {
             self.body.basic_mut().serve_until(server.deadline());
         }
         // Only a request without a reply can start a block.
         if has_reply {
-            return self.respond(turn);
+            return self.respond(context);
         }
         // A reply that still waits is obsolete: the client has sent its next request.
         *reply_due = Instant::NEVER;
         if B::Application::BLOCK_UPLOAD && server.is_sending() {
-            self.send_block(turn);
+            self.send_block(context);
         }
     }
 
     /// Sends segments of a block upload while the queue has plenty of room: a transfer must not delay PDOs.
     #[inline(never)]
-    fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+    fn send_block(&mut self, context: &mut Context<'_, impl Transmit>) {
         let id = self.body.basic().service(SDO_RESPONSE);
         let server = &mut self.services.server;
-        let has_reply = server.send_block(&self.body, turn.now, |data| {
-            turn.room() > B::RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
+        let has_reply = server.send_block(&self.body, context.now, |data| {
+            context.room() > B::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
-        let block_due = if server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
+        let block_due = if server.is_sending() { context.now + RETRY } else { Instant::NEVER };
         self.services.block_due = block_due;
         self.body.basic_mut().serve_until(block_due);
         if has_reply {
-            self.respond(turn);
+            self.respond(context);
         }
     }
 
     /// Sends the server's reply.
     #[inline(never)]
-    fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+    fn respond(&mut self, context: &mut Context<'_, impl Transmit>) {
         let basic = self.body.basic_mut();
         let id = basic.service(SDO_RESPONSE);
-        if turn.send(Frame::data_frame(id, 8, self.services.server.reply())) {
+        if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
             self.services.reply_due = Instant::NEVER;
         } else {
-            self.services.reply_due = turn.now + RETRY;
+            self.services.reply_due = context.now + RETRY;
             basic.serve_until(self.services.reply_due);
         }
     }
@@ -171,13 +171,13 @@ impl<B: Body> Node<B> {
         &mut self,
         result: Result<(), Abort>,
         lss_waits: bool,
-        turn: &mut Turn<'_, impl Transmit>,
+        context: &mut Context<'_, impl Transmit>,
     ) {
         if lss_waits {
-            self.services.lss.respond(lss::Slave::stored(result.is_ok()), turn);
+            self.services.lss.respond(lss::Slave::stored(result.is_ok()), context);
         }
-        if self.services.server.release(result, turn.now) {
-            self.respond(turn);
+        if self.services.server.release(result, context.now) {
+            self.respond(context);
         }
         self.body.basic_mut().services_due = STALE;
     }
@@ -192,27 +192,27 @@ impl<B: Body> Node<B> {
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
         self.services.lss.poll_switching(now, &mut self.body);
-        let turn = &mut self.services.turn(now, out);
-        self.services.lss.poll(turn);
+        let context = &mut self.services.context(now, out);
+        self.services.lss.poll(context);
         let basic = self.body.basic_mut();
         if !basic.is_initialising() {
             let id = basic.service(ERROR_CONTROL);
-            basic.heartbeat.poll(id, basic.state, turn);
-            self.body.poll_errors(turn);
+            basic.heartbeat.poll(id, basic.state, context);
+            self.body.poll_errors(context);
             self.silence_services();
         }
         if self.body.basic().state.has_services() {
-            self.poll_sdo(turn);
+            self.poll_sdo(context);
         }
         self.body.basic_mut().services_due = self.next_service();
     }
 
-    fn poll_sdo(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.services.reply_due || self.services.server.expire(turn.now) {
-            self.respond(turn);
+    fn poll_sdo(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now >= self.services.reply_due || self.services.server.expire(context.now) {
+            self.respond(context);
         }
-        if B::Application::BLOCK_UPLOAD && turn.now >= self.services.block_due {
-            self.send_block(turn);
+        if B::Application::BLOCK_UPLOAD && context.now >= self.services.block_due {
+            self.send_block(context);
         }
     }
 

@@ -6,7 +6,7 @@ use super::pdos::low_half;
 use super::{Action, Application, Device, Job, Next, Node, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{Instant, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.
@@ -44,14 +44,14 @@ impl Scope {
 pub(super) struct Pending {
     /// An action waits to be handed over.
     is_waiting: bool,
-    /// The scope of the next start. The caller is told once (`reset_untold`).
+    /// The scope of the next start. The caller is told once (`reset_is_new`).
     reset: Reset,
-    reset_untold: bool,
+    reset_is_new: bool,
     identifiers: bool,
     parameters: bool,
     /// The NMT state to enter with the first values, if 1F80h asks for it: before, PDOs would carry values nobody has
     /// measured.
-    pub(super) with_values: Option<State>,
+    pub(super) self_start_state: Option<State>,
     /// A request of LSS or of program control.
     request: Option<Action>,
     /// A job to store or restore values.
@@ -63,27 +63,27 @@ impl Pending {
         Pending {
             is_waiting: false,
             reset: Reset::Node,
-            reset_untold: false,
+            reset_is_new: false,
             identifiers: false,
             parameters: false,
-            with_values: None,
+            self_start_state: None,
             request: None,
             job: None,
         }
     }
 
     /// The values have been loaded, so all identifiers and parameters may have changed. A job under way continues.
-    fn begin_anew(&mut self) {
+    fn values_loaded(&mut self) {
         let job = self.job.take();
         *self = Pending { identifiers: true, parameters: true, is_waiting: true, job, ..Pending::new() };
     }
 
     fn has_action(&self) -> bool {
-        self.reset_untold || self.identifiers || self.request.is_some() || self.job.is_some()
+        self.reset_is_new || self.identifiers || self.request.is_some() || self.job.is_some()
     }
 
     fn reset(&mut self, reset: Reset) {
-        (self.reset, self.reset_untold, self.is_waiting) = (reset, true, true);
+        (self.reset, self.reset_is_new, self.is_waiting) = (reset, true, true);
     }
 
     /// Asks the caller for an action.
@@ -106,7 +106,7 @@ impl Pending {
 
     /// The next action for the caller.
     fn take_action(&mut self) -> Option<Action> {
-        if core::mem::take(&mut self.reset_untold) {
+        if core::mem::take(&mut self.reset_is_new) {
             return Some(match self.reset {
                 Reset::Node => Action::ResetNode,
                 Reset::Communication => Action::ResetCommunication,
@@ -149,12 +149,12 @@ impl<B: Body> Node<B> {
         self.body.load_values(everything);
         let basic = self.body.basic_mut();
         basic.application.initialise(&mut basic.image);
-        basic.pending.begin_anew();
+        basic.pending.values_loaded();
     }
 
     pub(super) fn command(&mut self, command: Command) {
         let pending = &mut self.body.basic_mut().pending;
-        pending.with_values = None;
+        pending.self_start_state = None;
         let state = match command {
             Command::Start => State::Operational,
             Command::Stop => State::Stopped,
@@ -201,7 +201,7 @@ impl<A: Application> Basic<A, [u8]> {
     }
 
     /// A device without a node-ID has received one. The caller has to start the device again.
-    pub(super) fn begin_join(&mut self) {
+    pub(super) fn request_boot_up(&mut self) {
         self.pending.reset(Reset::Communication);
     }
 
@@ -222,11 +222,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
-    pub(super) fn start_by_itself(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let Some(state) = self.body.basic.pending.with_values.take() else { return };
+    pub(super) fn self_start(&mut self, context: &mut Context<'_, impl Transmit>) {
+        let Some(state) = self.body.basic.pending.self_start_state.take() else { return };
         if self.body.emcy.register() == 0 {
             self.body.enter(state);
-            self.body.send_process(turn);
+            self.body.send_process(context);
         }
     }
 }

@@ -83,8 +83,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Reports the end of the job: `result` goes to the clients that wait for it.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
-        let turn = &mut self.services.turn(now, out);
-        self.finish_job(result, lss_waits, turn);
+        let context = &mut self.services.context(now, out);
+        self.finish_job(result, lss_waits, context);
         self.process_next()
     }
 }

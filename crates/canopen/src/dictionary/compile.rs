@@ -1,7 +1,7 @@
 //! Compiles rows to run-time tables. All of this runs during compilation: a panic here is a compile error.
 #![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
-use super::filling::{Filling, attributes, is_same, larger};
+use super::builder::{TableBuilder, attributes, is_same, larger};
 use super::{Access, Dictionary, Object, Tables, Type, check};
 
 /// The number of rows in all parts of a table.
@@ -90,7 +90,7 @@ impl Counts {
             check(all[i]);
             i += 1;
         }
-        Filling::of(all).filled
+        TableBuilder::of(all).used
     }
 }
 
@@ -99,11 +99,11 @@ impl Counts {
 /// # Panics
 /// During compilation, when a parameter is too small.
 #[must_use]
-#[allow(clippy::cast_possible_truncation)] // `MOST` is less than 2^16.
+#[allow(clippy::cast_possible_truncation)] // `MAX` is less than 2^16.
 pub const fn compile<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize>(
     all: &[&[Object]; D],
 ) -> Tables<D, S, P, A, V> {
-    let Filling { series, places, attributes, defaults, .. } = Filling::of(all);
+    let TableBuilder { series, places, attributes, defaults, .. } = TableBuilder::of(all);
     let (mut ends, mut end, mut i) = ([0; D], 0, 0);
     while i < D {
         end += series_count(all[i]);

@@ -7,11 +7,11 @@
 //! All values of a device are in one flat byte image, little endian as on the bus. An entry contains the location of
 //! its value.
 
+mod builder;
 mod check;
 mod compile;
 mod entry;
 mod field;
-mod filling;
 mod group;
 mod limits;
 mod object;

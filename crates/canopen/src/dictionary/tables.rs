@@ -31,7 +31,7 @@ pub(crate) struct Series {
     pub(crate) first: u16,
     /// Number of the first default byte, and how many bytes are stored. All further bytes are 0.
     pub(crate) defaults: u16,
-    pub(crate) given: u16,
+    pub(crate) defaults_len: u16,
     pub(crate) objects: u8,
     /// Number of entries of an object.
     pub(crate) entries: u8,
@@ -104,7 +104,7 @@ impl Dictionary {
 
     fn defaults_of(&self, series: &Series) -> &'static [u8] {
         let first = usize::from(series.defaults);
-        self.defaults.get(first..first + usize::from(series.given)).unwrap_or_default()
+        self.defaults.get(first..first + usize::from(series.defaults_len)).unwrap_or_default()
     }
 
     /// The index of the communication object of a PDO. `place` is the rank of the PDO among those of the dictionary in

@@ -3,7 +3,7 @@
 use super::history::History;
 use super::{Condition, Fault, FaultSet, Message};
 use crate::sdo::Abort;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
@@ -121,8 +121,8 @@ impl Producer {
     }
 
     /// Sends the waiting messages. Must be called only in NMT states with EMCY; in other states, messages keep waiting.
-    pub(crate) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now < self.due {
+    pub(crate) fn poll(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now < self.due {
             return;
         }
         let Some(cob_id) = self.id else {
@@ -131,13 +131,13 @@ impl Producer {
             return;
         };
         while let Some(message) = self.waiting.front() {
-            if !turn.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
-                self.due = turn.now + RETRY;
+            if !context.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
+                self.due = context.now + RETRY;
                 return;
             }
             let _ = self.waiting.pop_front();
             if self.inhibit != 0 {
-                self.inhibited_until = turn.now + Duration::from_inhibit(self.inhibit);
+                self.inhibited_until = context.now + Duration::from_inhibit(self.inhibit);
                 self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
                 return;
             }

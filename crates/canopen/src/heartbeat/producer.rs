@@ -1,7 +1,7 @@
 //! The heartbeat producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
 
 use crate::nmt::State;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Sends one boot-up message, then a heartbeat every period (1017h).
@@ -37,22 +37,22 @@ impl Producer {
     }
 
     /// Sends the boot-up message or the heartbeat, if it is due.
-    pub(crate) fn poll(&mut self, id: CanId, state: State, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now < self.due {
+    pub(crate) fn poll(&mut self, id: CanId, state: State, context: &mut Context<'_, impl Transmit>) {
+        if context.now < self.due {
             return;
         }
         let message = |state: State| Frame::data_frame(id, 1, [state.code(), 0, 0, 0, 0, 0, 0, 0]);
         let sent = if self.boot_up {
-            turn.send_boot_up(message(State::Initialising))
+            context.send_boot_up(message(State::Initialising))
         } else {
-            turn.send_state(message(state))
+            context.send_state(message(state))
         };
         if !sent {
-            self.due = turn.now + RETRY;
+            self.due = context.now + RETRY;
             return;
         }
         self.boot_up = false;
-        self.due = self.following(turn.now);
+        self.due = self.following(context.now);
     }
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.

@@ -21,7 +21,7 @@ pub(crate) enum Outcome {
     Silence,
     Answer(Response),
     /// A device without a node-ID has received one: it boots up.
-    Join,
+    BootUp,
     /// The bit rate changes.
     Switch(Switch),
     /// Store the configuration; the response is sent when this is done.
@@ -120,8 +120,8 @@ impl Slave {
     fn switch(&mut self, configuration: bool, node_id: Option<NodeId>) -> Outcome {
         let is_left = core::mem::replace(&mut self.is_selected, configuration) && !configuration;
         (self.selected, self.identified) = (0, 0);
-        let joins = is_left && node_id.is_none() && self.pending.node_id.is_some();
-        if joins { Outcome::Join } else { Outcome::Silence }
+        let boots_up = is_left && node_id.is_none() && self.pending.node_id.is_some();
+        if boots_up { Outcome::BootUp } else { Outcome::Silence }
     }
 
     fn select(&mut self, part: Part, value: u32, identity: &Identity) -> Outcome {

@@ -8,7 +8,7 @@
 use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
 use crate::sdo::Multiplexer;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
@@ -42,14 +42,14 @@ pub(crate) struct Watched {
     /// The value that was sent last; `None` before the first transmission.
     sent: Option<[u8; 4]>,
     /// Whether the object is sent: no other TPDO maps the object, and the application broadcasts it.
-    is_own: bool,
+    is_selected: bool,
     /// The value waits to be sent.
     is_pending: bool,
 }
 
 impl Watched {
     pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
-        Watched { at, field, sent: None, is_own: true, is_pending: false }
+        Watched { at, field, sent: None, is_selected: true, is_pending: false }
     }
 
     fn value(&self, image: &[u8]) -> [u8; 4] {
@@ -101,22 +101,22 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Selects the objects to send. An object that is selected for the first time is sent.
-    pub(crate) fn choose(&mut self, is_told: impl Fn(Multiplexer) -> bool) {
-        self.watched.iter_mut().for_each(|watched| watched.is_own = is_told(watched.at));
+    pub(crate) fn select(&mut self, is_broadcast: impl Fn(Multiplexer) -> bool) {
+        self.watched.iter_mut().for_each(|watched| watched.is_selected = is_broadcast(watched.at));
     }
 
     /// Forgets the sent values of objects that are not selected, so that they are sent as new if they are selected
     /// again.
-    pub(crate) fn forget_others(&mut self) {
-        for watched in self.watched.iter_mut().filter(|watched| !watched.is_own) {
+    pub(crate) fn forget_deselected(&mut self) {
+        for watched in self.watched.iter_mut().filter(|watched| !watched.is_selected) {
             (watched.sent, watched.is_pending) = (None, false);
         }
     }
 
     /// Deselects the objects that a TPDO maps.
-    pub(crate) fn leave_out(&mut self, layout: &Layout) {
+    pub(crate) fn deselect(&mut self, layout: &Layout) {
         for watched in &mut self.watched {
-            watched.is_own &= !layout.contains(watched.field);
+            watched.is_selected &= !layout.contains(watched.field);
         }
     }
 
@@ -131,8 +131,8 @@ impl<const M: usize> Scanner<M> {
     fn send_all(&mut self) {
         self.is_pending = false;
         for watched in &mut self.watched {
-            watched.is_pending = watched.is_own;
-            self.is_pending |= watched.is_own;
+            watched.is_pending = watched.is_selected;
+            self.is_pending |= watched.is_selected;
         }
     }
 
@@ -148,44 +148,44 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects whose value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
-            for watched in self.watched.iter_mut().filter(|watched| watched.is_own) {
+            for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
                 watched.is_pending |= watched.sent != Some(watched.value(image));
                 self.is_pending |= watched.is_pending;
             }
         }
-        self.poll(image, turn);
+        self.poll(image, context);
     }
 
     /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let Some(settings) = self.settings else { return };
-        let elapsed = turn.now >= self.event_due;
+        let elapsed = context.now >= self.event_due;
         if elapsed {
             self.send_all();
         }
         if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
-            self.event_due = turn.now + Duration::from_millis(settings.event.into());
+            self.event_due = context.now + Duration::from_millis(settings.event.into());
         }
         if !self.is_pending {
             return;
         }
         for watched in self.watched.iter_mut().filter(|watched| watched.is_pending) {
-            if turn.now < self.inhibited_until {
+            if context.now < self.inhibited_until {
                 return;
             }
             let data = watched.value(image);
             // All these frames have the same identifier but different objects: no frame may replace another in the
             // queue.
-            if !turn.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
-                self.inhibited_until = turn.now + RETRY;
+            if !context.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+                self.inhibited_until = context.now + RETRY;
                 return;
             }
             (watched.sent, watched.is_pending) = (Some(data), false);
             if settings.inhibit != 0 {
-                self.inhibited_until = turn.now + Duration::from_inhibit(settings.inhibit);
+                self.inhibited_until = context.now + Duration::from_inhibit(settings.inhibit);
             }
         }
         self.is_pending = false;

@@ -9,7 +9,7 @@
 
 use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
@@ -140,23 +140,28 @@ impl Tpdo {
     }
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, turn: &Turn<'_, impl Transmit>) -> Option<u16> {
+    pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
-            && turn.now >= self.inhibited_until;
-        if is_asked_now && turn.room() <= ROOM_FOR_OTHERS {
-            (self.events.may_wait, self.inhibited_until) = (true, turn.now + RETRY);
+            && context.now >= self.inhibited_until;
+        if is_asked_now && context.room() <= ROOM_FOR_OTHERS {
+            (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
             return None;
         }
         settings.events_of.filter(|_| is_asked_now)
     }
 
     /// Handles the answer of the application. If `is_event`, the event is in the image.
-    pub(crate) fn take_event(&mut self, is_event: bool, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    pub(crate) fn take_event(
+        &mut self,
+        is_event: bool,
+        image: &[u8],
+        context: &mut Context<'_, impl Transmit>,
+    ) {
         if is_event || self.events.is_silent && self.data.is_some() {
-            self.send(image, turn);
+            self.send(image, context);
         }
         self.events.is_silent = false;
         self.events.may_wait = is_event;
@@ -184,11 +189,13 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let transmission = self.settings.transmission;
         match transmission {
-            Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => self.send(image, turn),
-            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
+            Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
+                self.send(image, context);
+            }
+            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, context),
             Transmission::SyncRemote => self.data = Some(self.settings.layout.gather(image)),
             _ => (),
         }
@@ -215,7 +222,7 @@ impl Tpdo {
     }
 
     /// Answers a remote frame. TPDOs of the synchronous types 0 to 240 are sent by SYNC only and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
             return;
@@ -223,12 +230,12 @@ impl Tpdo {
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // In a full queue the sample is dropped: the client repeats its request.
-                turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                context.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             // Before the first event, there is nothing to send.
             _ if settings.events_of.is_some() && self.data.is_none() => (),
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, turn);
+                self.send(image, context);
             }
             _ => (),
         }
@@ -240,10 +247,10 @@ impl Tpdo {
     }
 
     /// Sends the values if a mapped value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         if self.settings.sends_on_change() && self.has_changed(image) {
             self.pending = true;
-            self.poll(image, turn);
+            self.poll(image, context);
         }
     }
 
@@ -261,19 +268,19 @@ impl Tpdo {
     }
 
     /// Sends the TPDO if a transmission is due.
-    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let elapsed = turn.now >= self.event_due;
-        let tells_events = self.events_of().is_some();
-        if elapsed || tells_events && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(turn.now);
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+        let elapsed = context.now >= self.event_due;
+        let sends_events = self.events_of().is_some();
+        if elapsed || sends_events && self.event_due == Instant::NEVER {
+            self.event_due = self.following_event(context.now);
         }
-        if !tells_events {
+        if !sends_events {
             self.pending |= elapsed;
         } else if elapsed {
             self.events = Events { may_wait: true, is_open: true, is_silent: true };
         }
-        if self.pending && turn.now >= self.inhibited_until {
-            self.send(image, turn);
+        if self.pending && context.now >= self.inhibited_until {
+            self.send(image, context);
         }
     }
 
@@ -288,23 +295,23 @@ impl Tpdo {
     }
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
-    fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    fn send(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let Settings { id, layout, transmission, inhibit, .. } = &self.settings;
         let data = layout.gather(image);
         let frame = Frame::data_frame(*id, layout.len(), data);
-        let tells_events = self.settings.events_of.is_some();
-        let is_sent = if tells_events { turn.send(frame) } else { turn.send_state(frame) };
+        let sends_events = self.settings.events_of.is_some();
+        let is_sent = if sends_events { context.send(frame) } else { context.send_state(frame) };
         self.pending = !is_sent;
         if is_sent {
             self.data = Some(data);
             if *inhibit != 0 {
-                self.inhibited_until = turn.now + Duration::from_inhibit(*inhibit);
+                self.inhibited_until = context.now + Duration::from_inhibit(*inhibit);
             }
         } else {
-            self.inhibited_until = turn.now + RETRY;
+            self.inhibited_until = context.now + RETRY;
         }
         if transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(turn.now);
+            self.event_due = self.following_event(context.now);
         }
     }
 }

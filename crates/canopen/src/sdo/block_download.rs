@@ -29,13 +29,13 @@ impl Receiver {
     }
 
     /// Whether the next frame is a segment and not a request.
-    pub(super) fn wants_segments(&self) -> bool {
+    pub(super) fn expects_segments(&self) -> bool {
         self.last.is_none()
     }
 
     /// Whether a block has begun and is not complete. If its last segment is lost, only a time-out can end the block.
     pub(super) fn is_within_block(&self) -> bool {
-        self.wants_segments() && self.has_begun
+        self.expects_segments() && self.has_begun
     }
 
     /// Takes a frame that is the next segment of a block, if the buffer has room for a whole segment. Most frames of a

@@ -39,7 +39,7 @@ enum Transfer {
     BlockUpload(Sender),
     BlockDownload(Receiver),
     /// All data has arrived. The reply waits until the device has carried out the write.
-    Held,
+    Deferred,
 }
 
 /// Whether there is a reply now.
@@ -112,8 +112,8 @@ impl Server {
     #[inline]
     pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
         let command = frame[0] >> 5;
-        if !matches!(command, 1 | 2) || self.wants_block_segments() {
-            self.go_on(frame, objects, now)
+        if !matches!(command, 1 | 2) || self.expects_block_segments() {
+            self.answer_in_series(frame, objects, now)
         } else if command == 1 {
             self.initiate_download(frame, objects, now)
         } else {
@@ -123,7 +123,7 @@ impl Server {
 
     /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
-    fn go_on(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
         let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
@@ -143,11 +143,11 @@ impl Server {
     /// like it.
     fn is_repeatable(&self, frame: &[u8; 8]) -> bool {
         let changes = matches!(frame[0] >> 5, 0 | 3) || frame[0] & 0xE1 == 0xC1;
-        Response::begins_block_download(&self.reply) || changes && !self.wants_block_segments()
+        Response::begins_block_download(&self.reply) || changes && !self.expects_block_segments()
     }
 
-    fn wants_block_segments(&self) -> bool {
-        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.wants_segments())
+    fn expects_block_segments(&self) -> bool {
+        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.expects_segments())
     }
 
     /// The frame as a segment of a block download. Within a block, every frame is a segment, unless its first byte is
@@ -155,13 +155,13 @@ impl Server {
     fn block_segment(&self, frame: &[u8; 8], is_repeated: bool) -> Option<BlockSegment> {
         let Transfer::BlockDownload(receiver) = &self.transfer else { return None };
         let segment = BlockSegment::parse(*frame)?;
-        (receiver.wants_segments() || is_repeated).then_some(segment)
+        (receiver.expects_segments() || is_repeated).then_some(segment)
     }
 
     /// Stores the frame of a response. Returns `true`: there is a reply.
     #[inline(always)]
     #[allow(clippy::inline_always)] // As for `encode`.
-    fn say(&mut self, response: Response) -> bool {
+    fn set_reply(&mut self, response: Response) -> bool {
         self.reply = response.encode();
         true
     }
@@ -169,7 +169,7 @@ impl Server {
     /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
     fn conclude(&mut self, answer: Answer, objects: &mut impl Objects, now: Instant) -> bool {
         if answer == Ok(true) && objects.take_deferred() {
-            self.transfer = Transfer::Held;
+            self.transfer = Transfer::Deferred;
             return self.settle(Ok(false), now);
         }
         self.settle(answer, now)
@@ -178,7 +178,7 @@ impl Server {
     /// Reports the end of a write whose reply was held back. Returns whether there is a reply and its client still
     /// waits.
     pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> bool {
-        if !matches!(self.transfer, Transfer::Held) {
+        if !matches!(self.transfer, Transfer::Deferred) {
             return false;
         }
         self.transfer = Transfer::Idle;
@@ -196,7 +196,7 @@ impl Server {
                 if receiver.is_within_block() && now < self.active + TIME_OUT =>
             {
                 let sequence = receiver.acknowledge();
-                self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX))
+                self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
             _ => self.settle(Err(Abort::TimeOut), now),
         }
@@ -214,7 +214,7 @@ impl Server {
     fn give_up(&mut self, abort: Abort) -> bool {
         self.transfer = Transfer::Idle;
         self.is_answered = false;
-        self.say(Response::Abort(self.multiplexer, abort.code()))
+        self.set_reply(Response::Abort(self.multiplexer, abort.code()))
     }
 
     /// Whether segments of a block remain to be sent.

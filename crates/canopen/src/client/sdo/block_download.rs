@@ -7,7 +7,7 @@ use crate::sdo::{BlockEnd, BlockSegment, BlockSize, Bytes, Multiplexer, Request,
 use crate::{Instant, NodeId};
 
 /// The transfer fails after this many blocks in a row without a segment that the server acknowledged.
-const FUTILE: u8 = 3;
+const MAX_EMPTY_BLOCKS: u8 = 3;
 
 /// A block download under way.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub struct Protocol<'a> {
     done: usize,
     phase: Phase,
     /// Blocks in a row of which the server acknowledged no segment.
-    futile: u8,
+    empty_blocks: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,7 @@ impl<'a> BlockDownload<'a> {
     /// Writes an object of a node. Empty data is sent as one segment without bytes.
     #[must_use]
     pub fn new(node: NodeId, at: Multiplexer, data: &'a [u8], options: Options) -> BlockDownload<'a> {
-        Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, futile: 0 }, node, at, options)
+        Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, empty_blocks: 0 }, node, at, options)
     }
 }
 
@@ -58,8 +58,8 @@ impl Protocol<'_> {
     fn acknowledge(&mut self, sequence: u8, next: BlockSize, link: &mut Link) -> Result<Progress, Error> {
         let is_all = 7 * usize::from(sequence) >= self.rest(0).len() && sequence > 0;
         self.done = self.done.saturating_add(7 * usize::from(sequence)).min(self.data.len());
-        self.futile = if sequence == 0 { self.futile.saturating_add(1) } else { 0 };
-        if self.futile == FUTILE {
+        self.empty_blocks = if sequence == 0 { self.empty_blocks.saturating_add(1) } else { 0 };
+        if self.empty_blocks == MAX_EMPTY_BLOCKS {
             return Err(Error::Unexpected);
         }
         if is_all {
@@ -69,13 +69,13 @@ impl Protocol<'_> {
         } else {
             self.phase = Phase::Block { size: next, sent: 0 };
         }
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 }
 
 impl transfer::Protocol for Protocol<'_> {
     fn begin(&mut self, link: &mut Link) {
-        (self.done, self.phase, self.futile) = (0, Phase::Begin, 0);
+        (self.done, self.phase, self.empty_blocks) = (0, Phase::Begin, 0);
         let size = u32::try_from(self.data.len()).ok();
         link.begin(Request::BlockDownload { at: link.at, crc: true, size });
     }
@@ -98,7 +98,7 @@ impl transfer::Protocol for Protocol<'_> {
         match (self.phase, Response::parse(data)) {
             (Phase::Begin, Some(Response::BlockDownload(of, size))) if of == link.at => {
                 self.phase = Phase::Block { size, sent: 0 };
-                Ok(Progress::Goes)
+                Ok(Progress::Continues)
             }
             (Phase::Block { size, sent }, Some(Response::BlockAcknowledge(sequence, next)))
                 if sent == self.len(size) && sequence <= sent =>
@@ -106,7 +106,7 @@ impl transfer::Protocol for Protocol<'_> {
                 self.acknowledge(sequence, next, link)
             }
             (Phase::End, Some(Response::BlockDownloaded)) => Ok(Progress::Complete),
-            _ => Ok(Progress::Unfit),
+            _ => Ok(Progress::Unexpected),
         }
     }
 

@@ -10,7 +10,7 @@ use crate::{Duration, Instant, NodeId};
 /// A pause of this length within a block means that its last segment was lost. The time-out of servers is longer.
 const PAUSE: Duration = Duration::from_millis(250);
 /// The transfer fails after this many blocks in a row without a segment in sequence.
-const FUTILE: u8 = 3;
+const MAX_EMPTY_BLOCKS: u8 = 3;
 
 /// A block upload under way.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ pub struct Protocol<S> {
     /// CRC of the bytes in the sink.
     crc: u16,
     /// Blocks in a row without a segment in sequence.
-    futile: u8,
+    empty_blocks: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,7 @@ impl<S: Sink> BlockUpload<S> {
             held: None,
             received: 0,
             crc: 0,
-            futile: 0,
+            empty_blocks: 0,
         };
         Transfer::with(protocol, node, at, options)
     }
@@ -81,12 +81,12 @@ impl<S: Sink> Protocol<S> {
         self.size = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
         self.phase = Phase::Block(0);
         link.ask(Request::BlockUploadStart);
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 
     fn on_simple(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error> {
         let progress = transfer::Protocol::on_response(&mut self.simple, data, link, now)?;
-        if progress == Progress::Goes {
+        if progress == Progress::Continues {
             self.phase = Phase::Simple;
         }
         Ok(progress)
@@ -110,7 +110,7 @@ impl<S: Sink> Protocol<S> {
         } else {
             link.wait(PAUSE.min(link.options.timeout), now);
         }
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 
     /// Holds a segment back, and hands the segment before it to the sink: that one was not the last.
@@ -132,8 +132,8 @@ impl<S: Sink> Protocol<S> {
 
     /// Acknowledges a block. The server sends segments that did not arrive in sequence again in the next block.
     fn acknowledge(&mut self, sequence: u8, is_all: bool, link: &mut Link) -> Result<(), Error> {
-        self.futile = if sequence == 0 { self.futile.saturating_add(1) } else { 0 };
-        if self.futile == FUTILE {
+        self.empty_blocks = if sequence == 0 { self.empty_blocks.saturating_add(1) } else { 0 };
+        if self.empty_blocks == MAX_EMPTY_BLOCKS {
             return Err(Error::Unexpected);
         }
         self.phase = if is_all { Phase::End } else { Phase::Block(0) };
@@ -166,7 +166,7 @@ impl<S: Sink> Protocol<S> {
 impl<S: Sink> transfer::Protocol for Protocol<S> {
     fn begin(&mut self, link: &mut Link) {
         self.simple.reset();
-        (self.phase, self.held, self.received, self.crc, self.futile) = (Phase::Begin, None, 0, 0, 0);
+        (self.phase, self.held, self.received, self.crc, self.empty_blocks) = (Phase::Begin, None, 0, 0, 0);
         let block_size = link.options.block_size.get();
         link.begin(Request::BlockUpload { at: link.at, crc: true, block_size, threshold: 0 });
     }
@@ -177,11 +177,11 @@ impl<S: Sink> transfer::Protocol for Protocol<S> {
             Phase::Simple => self.on_simple(data, link, now),
             Phase::Block(before) => match BlockSegment::parse(data) {
                 Some(segment) => self.on_segment(segment, before, link, now),
-                None => Ok(Progress::Unfit),
+                None => Ok(Progress::Unexpected),
             },
             Phase::End => match Response::parse(data) {
                 Some(Response::BlockUploadEnd(end)) => self.on_end(end, link),
-                _ => Ok(Progress::Unfit),
+                _ => Ok(Progress::Unexpected),
             },
         }
     }

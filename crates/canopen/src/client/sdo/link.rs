@@ -24,7 +24,7 @@ pub struct Link {
     patience: Duration,
     answer_by: Instant,
     /// A frame that does not fit has arrived since the last request.
-    has_unfit: bool,
+    has_unexpected: bool,
     /// The newest frame of the server. A frame that arrives twice in a row counts once.
     newest: Option<[u8; 8]>,
 }
@@ -39,7 +39,7 @@ impl Link {
             is_first: false,
             patience: options.timeout,
             answer_by: Instant::NEVER,
-            has_unfit: false,
+            has_unexpected: false,
             newest: None,
         }
     }
@@ -55,7 +55,7 @@ impl Link {
     pub(super) fn ask(&mut self, request: Request) {
         self.outgoing = Some(request.encode());
         self.is_first = false;
-        self.has_unfit = false;
+        self.has_unexpected = false;
         self.patience = self.options.timeout;
     }
 
@@ -73,7 +73,7 @@ impl Link {
 
     /// A frame for a segment of a block. The answer is due within the usual time-out.
     pub(super) fn segment(&mut self, data: [u8; 8], now: Instant) -> Frame {
-        self.has_unfit = false;
+        self.has_unexpected = false;
         self.answer_by = later(now, self.options.timeout);
         self.frame(data)
     }
@@ -121,12 +121,12 @@ impl Link {
         is_ours.then_some(AbortCode(code))
     }
 
-    pub(super) fn note_unfit(&mut self) {
-        self.has_unfit = true;
+    pub(super) fn note_unexpected(&mut self) {
+        self.has_unexpected = true;
     }
 
     /// The error for an answer that did not arrive.
     pub(super) fn silence(&self) -> Error {
-        if self.has_unfit { Error::Unexpected } else { Error::NoAnswer }
+        if self.has_unexpected { Error::Unexpected } else { Error::NoAnswer }
     }
 }

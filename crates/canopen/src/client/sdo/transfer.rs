@@ -39,11 +39,11 @@ pub trait Protocol {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// The transfer goes on.
-    Goes,
+    Continues,
     /// The transfer is complete; one last frame may remain to be sent.
     Complete,
     /// The answer does not fit the state of the transfer.
-    Unfit,
+    Unexpected,
 }
 
 /// The state of the transfer.
@@ -166,14 +166,14 @@ impl<P: Protocol> Service for Transfer<P> {
             return Taken::Used;
         }
         match self.protocol.on_response(data, &mut self.link, now) {
-            Ok(Progress::Goes) => Taken::Used,
+            Ok(Progress::Continues) => Taken::Used,
             Ok(Progress::Complete) => {
                 self.phase = Phase::Over(Ok(()));
                 Taken::Used
             }
-            Ok(Progress::Unfit) => {
-                self.link.note_unfit();
-                Taken::Unfit
+            Ok(Progress::Unexpected) => {
+                self.link.note_unexpected();
+                Taken::Unexpected
             }
             Err(error) => {
                 self.fail(error);

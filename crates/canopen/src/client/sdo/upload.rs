@@ -69,13 +69,13 @@ impl<S: Sink> Protocol<S> {
         let size = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
         self.segments = Some(Segments { toggle: false, size });
         link.ask(Request::UploadSegment { toggle: false });
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 
     /// Takes a segment. An empty segment that is not the last one is refused: the transfer might never end.
     fn take(&mut self, segment: &Segment, now: Segments, link: &mut Link) -> Result<Progress, Error> {
         if segment.toggle != now.toggle {
-            return Ok(Progress::Unfit);
+            return Ok(Progress::Unexpected);
         }
         self.received = self.received.saturating_add(segment.data.len().into());
         let is_too_much = now.size.is_some_and(|size| self.received > size);
@@ -92,7 +92,7 @@ impl<S: Sink> Protocol<S> {
         let toggle = !now.toggle;
         self.segments = Some(Segments { toggle, ..now });
         link.ask(Request::UploadSegment { toggle });
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 }
 
@@ -109,7 +109,7 @@ impl<S: Sink> transfer::Protocol for Protocol<S> {
                 self.begin_segments(size, link)
             }
             (Some(now), Some(Response::UploadedSegment(segment))) => self.take(&segment, now, link),
-            _ => Ok(Progress::Unfit),
+            _ => Ok(Progress::Unexpected),
         }
     }
 

@@ -51,7 +51,7 @@ impl Server {
             Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| false),
             Request::BlockAcknowledge { sequence, block_size } => {
                 match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
-                    Some(end) => Ok(self.say(Response::BlockUploadEnd(end))),
+                    Some(end) => Ok(self.set_reply(Response::BlockUploadEnd(end))),
                     None => Ok(false),
                 }
             }
@@ -80,7 +80,7 @@ impl Server {
             Some(data) => objects.write(at, data, now),
             None => self.download(at, frame, objects, now),
         };
-        let answer = result.map(|()| self.say(Response::Downloaded(at)));
+        let answer = result.map(|()| self.set_reply(Response::Downloaded(at)));
         self.conclude(answer, objects, now)
     }
 
@@ -107,11 +107,11 @@ impl Server {
         self.begin(at);
         let value = objects.read(at)?;
         if value.len() <= 4 {
-            return Ok(self.say(Response::Uploaded(at, Bytes::from_slice(value))));
+            return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(value))));
         }
         let source = Source::new(at, value, &mut self.buffer);
         self.transfer = Transfer::Upload(Upload::new(source));
-        Ok(self.say(Response::UploadSegmented(at, Some(source.size()))))
+        Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
     }
 
     fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
@@ -120,7 +120,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.say(Response::UploadedSegment(segment)))
+        Ok(self.set_reply(Response::UploadedSegment(segment)))
     }
 
     #[inline(never)]
@@ -150,7 +150,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.say(Response::DownloadedSegment { toggle: segment.toggle }))
+        Ok(self.set_reply(Response::DownloadedSegment { toggle: segment.toggle }))
     }
 
     fn block_download(
@@ -163,7 +163,7 @@ impl Server {
         self.begin(at);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
-        Ok(self.say(Response::BlockDownload(at, BlockSize::MAX)))
+        Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
     pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut impl Objects) -> Answer {
@@ -172,14 +172,14 @@ impl Server {
             return Ok(false);
         }
         let sequence = receiver.acknowledge();
-        Ok(self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
+        Ok(self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
     fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
-        Ok(self.say(Response::BlockDownloaded))
+        Ok(self.set_reply(Response::BlockDownloaded))
     }
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
@@ -197,7 +197,7 @@ impl Server {
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        Ok(self.say(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
+        Ok(self.set_reply(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {
