@@ -11,8 +11,8 @@ use crate::{CanId, Instant, NodeId, heartbeat};
 /// Identity object.
 const IDENTITY: u16 = 0x1018;
 
-/// The part of a device that NMT, SDO, heartbeat and LSS need; `Services` adds the SDO
-/// server and the LSS slave. `I` is the memory of all values.
+/// The part of a device that NMT, SDO, heartbeat and LSS need; `Services` adds the SDO server and the LSS slave.
+/// `I` is the memory of all values.
 #[derive(Debug)]
 pub struct Basic<A, I: ?Sized> {
     pub(super) dictionary: &'static Dictionary,

@@ -10,7 +10,7 @@ use crate::{Frame, Instant, NodeId, Transmit};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Switching {
     No,
-    /// The delay before the change. Nothing is sent until the bus is quiet.
+    /// The delay before the change. Nothing is sent, so that the bus becomes quiet.
     Before(Switch),
     /// The delay after the change, until all other nodes have changed too.
     After,

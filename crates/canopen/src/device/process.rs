@@ -66,7 +66,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     Device<A, N, T, R, W, M>
 {
     /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
-    /// starts by itself (1F80h), its first call after a start makes the device operational.
+    /// starts by itself (1F80h), the first `publish` after a start makes the device operational.
     pub fn publish(
         &mut self,
         now: Instant,

@@ -70,7 +70,7 @@ macro_rules! dictionaries {
 pub struct Counts {
     /// Series of objects.
     pub series: usize,
-    /// Entries of the shapes of objects.
+    /// Entries of all different shapes of objects.
     pub places: usize,
     /// Different attributes.
     pub attributes: usize,

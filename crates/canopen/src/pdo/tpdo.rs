@@ -76,7 +76,7 @@ pub(crate) struct Tpdo {
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::struct_excessive_bools)] // Independent flags.
 struct Events {
-    /// The last request brought an event, so more events may wait.
+    /// Events may wait in the application: ask again.
     may_wait: bool,
     /// The event timer has elapsed, and not all waiting events have been sent.
     is_open: bool,
