@@ -133,7 +133,7 @@ impl<'a, C: Channel> Client<'a, C> {
 fn offer(service: &mut impl Service, response: [u8; 8], now: Instant) -> Result<(), Failure> {
     let frame = Frame::new(0x580 + u16::from(NODE.get()), &response).expect("a frame");
     let taken = service.on_frame(&frame, now);
-    if taken == Taken::Unfit { Err(Failure::Unexpected(response)) } else { Ok(()) }
+    if taken == Taken::Unexpected { Err(Failure::Unexpected(response)) } else { Ok(()) }
 }
 
 fn failure(error: Error) -> Failure {

@@ -12,29 +12,30 @@ impl CanId {
     /// The function code in an identifier of the pre-defined connection set.
     pub(crate) const FUNCTION: u16 = 0x780;
 
-    /// `None` above 7FFh.
+    /// A CAN-ID from its number; `None` above 7FFh.
     #[must_use]
     pub const fn new(id: u16) -> Option<CanId> {
         if id <= 0x7FF { Some(CanId(id)) } else { None }
     }
 
-    /// The number.
+    /// The CAN-ID as a number, 0 to 7FFh.
     #[must_use]
     pub const fn get(self) -> u16 {
         self.0
     }
 
-    /// An identifier of the pre-defined connection set: a function code in bits 7..10, a node-ID below.
+    /// The identifier of a service in the pre-defined connection set: function code in bits 7..10, node-ID in bits
+    /// 0..6.
     pub(crate) const fn of_service(function: u16, node: u8) -> CanId {
         CanId((function & 0x780) | (node & 0x7F) as u16)
     }
 
-    /// Whether a CAN-ID has the same function code, with the node-ID of any node.
+    /// Whether a CAN-ID has the function code of this one. The node-ID may be any but 0.
     pub(crate) const fn is_of_same_service(self, id: u16) -> bool {
         (id ^ self.0) & Self::FUNCTION == 0 && id & 0x7F != 0
     }
 
-    /// The identifiers with this function code, one for each node.
+    /// The identifiers with the function code of this one, for the node-IDs 1 to 127.
     pub(crate) fn of_all_nodes(self) -> impl Iterator<Item = CanId> {
         (1..=0x7F).map(move |node| CanId::of_service(self.0, node))
     }
@@ -44,7 +45,7 @@ impl CanId {
         CanId(0x7E4 | (direction & 1))
     }
 
-    /// Whether no configurable service may use it: NMT, SDO, error control, and the ranges that
+    /// Whether configurable services must not use this CAN-ID: NMT, SDO, error control, and the ranges that
     /// CiA 301 reserves (7.3.5, restricted CAN-IDs).
     #[must_use]
     #[inline(never)]
@@ -53,7 +54,7 @@ impl CanId {
     }
 }
 
-/// The value of a COB-ID entry: an 11-bit CAN-ID and two flags, the meaning of bit 30 depending on the object.
+/// The value of a COB-ID entry: an 11-bit CAN-ID and two flags. The meaning of the flags depends on the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CobId {
     /// The CAN-ID, bits 0..10.
@@ -65,7 +66,7 @@ pub struct CobId {
 }
 
 impl CobId {
-    /// `None` for an extended frame (bit 29) or a CAN-ID of more than 11 bits: this node has base frames only.
+    /// `None` for an extended frame (bit 29) or a CAN-ID of more than 11 bits: this node uses base frames only.
     #[must_use]
     pub fn parse(value: u32) -> Option<CobId> {
         let id = CanId::new(u16::try_from(value & 0x3FFF_FFFF).ok()?)?;

@@ -1,7 +1,7 @@
 //! Copies that cannot panic.
 
-/// Copies as many bytes as both have. `copy_from_slice` panics where the lengths differ, and where a caller has made them
-/// equal, a compiler that goes for size may compare them all the same.
+/// Copies as many bytes as the shorter slice has. `copy_from_slice` panics where the lengths differ. Even where a
+/// caller has made them equal, a compiler that optimises for size may keep the comparison.
 #[inline]
 pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);

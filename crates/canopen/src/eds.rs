@@ -1,4 +1,4 @@
-//! The electronic data sheet (CiA 306) of a table of rows: what a tool or a master reads about the device.
+//! The electronic data sheet (CiA 306) of a table of rows, for configuration tools and masters.
 //!
 //! ```
 //! use canopen::eds::DeviceInfo;
@@ -67,7 +67,7 @@ fn info(rows: &[Object], device: &DeviceInfo<'_>, out: &mut impl Write) -> Resul
     writeln!(out, "\n[Comments]\nLines=0\n")
 }
 
-/// The lists of mandatory, optional and manufacturer's objects.
+/// The lists of mandatory, optional and manufacturer-specific objects.
 fn lists(rows: &[Object], out: &mut impl Write) -> Result {
     let is_mandatory = |index: u16| matches!(index, 0x1000 | 0x1001 | 0x1018);
     let is_manufacturer = |index: u16| matches!(index, 0x2000..=0x5FFF);

@@ -1,10 +1,10 @@
-//! [`Frame`] as a frame of embedded-can, for drivers that speak it.
+//! Conversion of [`Frame`] to and from the frames of embedded-can drivers.
 
 use embedded_can::{Frame as Driver, Id, StandardId};
 
 use crate::Frame;
 
-/// Base frames only: an extended identifier gives `None`.
+/// Base frames only: `new` and `new_remote` return `None` for an extended identifier.
 impl Driver for Frame {
     fn new(id: impl Into<Id>, data: &[u8]) -> Option<Frame> {
         match id.into() {
@@ -41,7 +41,7 @@ impl Driver for Frame {
     }
 }
 
-/// A frame of a driver; `None` for an extended identifier, which CANopen does not use here.
+/// Converts a frame of a driver; `None` for an extended identifier, which this crate does not use.
 pub fn from_driver(frame: &impl Driver) -> Option<Frame> {
     if frame.is_remote_frame() {
         <Frame as Driver>::new_remote(frame.id(), frame.dlc())
@@ -50,7 +50,7 @@ pub fn from_driver(frame: &impl Driver) -> Option<Frame> {
     }
 }
 
-/// The frame of a driver.
+/// Converts a frame for a driver; `None` if the driver refuses it.
 #[must_use]
 pub fn to_driver<F: Driver>(frame: &Frame) -> Option<F> {
     let id = StandardId::new(frame.id())?;

@@ -1,19 +1,19 @@
-//! The frames that CANopen uses: 11-bit identifiers, data or remote.
+//! CAN frames as CANopen uses them: 11-bit identifier, data or remote frame.
 
 use crate::CanId;
 use crate::copy::copy;
 
-/// A frame on the wire. CANopen services of this node use the CAN base frame format only (CiA 301, 7.3.5).
+/// A CAN frame. This node uses the CAN base frame format only (CiA 301, 7.3.5).
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// CAN-ID, data length code and remote transmission request in one word, which is compared at once.
+    /// CAN-ID, data length code and remote transmission request in one word, so that one comparison checks all three.
     head: u32,
     data: [u8; 8],
 }
 
-/// Where the data length code is in the head.
+/// The position of the data length code in the head.
 const LEN: u32 = 16;
-/// The remote transmission request in the head.
+/// The bit of the remote transmission request in the head.
 const REMOTE: u32 = 1 << 24;
 
 impl Frame {
@@ -31,12 +31,12 @@ impl Frame {
         Frame { head: head(id.get(), len), data }
     }
 
-    /// The data bytes, then zeros.
+    /// The data bytes, followed by zeros.
     pub(crate) fn bytes(&self) -> [u8; 8] {
         self.data
     }
 
-    /// All eight bytes, if this is a full data frame with this identifier.
+    /// The data, if this is a data frame of eight bytes with this identifier.
     #[inline]
     pub(crate) fn full(&self, id: impl Into<FullFrameId>) -> Option<&[u8; 8]> {
         (self.head == id.into().0).then_some(&self.data)
@@ -55,7 +55,7 @@ impl Frame {
         u16::from_le_bytes([low, high])
     }
 
-    /// Whether it is a remote frame (RTR).
+    /// Whether this is a remote frame (RTR).
     #[must_use]
     pub fn is_remote(&self) -> bool {
         self.head & REMOTE != 0
@@ -68,7 +68,7 @@ impl Frame {
         usize::from(len)
     }
 
-    /// Whether it carries no data.
+    /// Whether the frame carries no data.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -81,7 +81,7 @@ impl Frame {
     }
 }
 
-/// The identifier of data frames of eight bytes, as it is in their heads.
+/// The head of data frames of eight bytes with one identifier, for a comparison with [`Frame::full`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FullFrameId(u32);
 

@@ -1,4 +1,4 @@
-//! A page for each task, from the first object to the data sheet. Every example is compiled and run.
+//! One page for each task, from the first object to the data sheet. Every example is compiled and run.
 //!
 //! 1. [Add an object](add_an_object)
 //! 2. [Map a PDO](map_a_pdo)

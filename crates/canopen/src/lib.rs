@@ -2,7 +2,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
-// Nothing that comes from the bus or from the flash may panic or index out of range.
+// Data from the bus or from the flash must never cause a panic or an index out of range.
 #![cfg_attr(
     not(test),
     warn(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)

@@ -2,18 +2,18 @@
 
 use crate::NodeId;
 
-/// The NMT state. The discriminant is its code in a heartbeat.
+/// The NMT state. The discriminant is the code of the state in a heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum State {
-    /// Before boot-up: the node is silent and hears nothing. Its code is that of the boot-up message.
+    /// Before boot-up: only LSS works. The code is the content of the boot-up message.
     Initialising = 0x00,
-    /// Error control and NMT only.
+    /// Error control and NMT only. LSS works in every state.
     Stopped = 0x04,
-    /// Everything.
+    /// All services and PDOs.
     Operational = 0x05,
-    /// Everything but PDOs.
+    /// All services, no PDOs.
     PreOperational = 0x7F,
 }
 
@@ -76,7 +76,7 @@ impl Command {
         Command::ResetCommunication,
     ];
 
-    /// The command of a frame with CAN-ID 0 when it is for this node, by its own node-ID or by 0 for all.
+    /// The command in a frame with CAN-ID 0. `None` unless the frame addresses node `own` or all nodes (node-ID 0).
     #[must_use]
     pub fn parse(data: &[u8], own: NodeId) -> Option<Command> {
         let &[specifier, node] = data else { return None };
@@ -86,7 +86,7 @@ impl Command {
         Command::ALL.into_iter().find(|&command| command as u8 == specifier)
     }
 
-    /// The frame's data, for one node or for all.
+    /// The data of the frame, for one node, or for all nodes with `None`.
     #[must_use]
     pub fn encode(self, node: Option<NodeId>) -> [u8; 2] {
         [self as u8, node.map_or(0, NodeId::get)]

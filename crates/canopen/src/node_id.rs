@@ -1,15 +1,15 @@
-//! The node-ID and the identifiers that follow from it.
+//! The node-ID, and the CAN-IDs that depend on it.
 
 use crate::CanId;
 use core::num::NonZeroU8;
 
-/// A node-ID, 1 to 127 (CiA 301, 7.3.5). 0 addresses all nodes and is never a node's own.
+/// A node-ID, 1 to 127 (CiA 301, 7.3.5). 0 addresses all nodes and is not a node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NodeId(NonZeroU8);
 
 impl NodeId {
-    /// `None` outside 1 to 127.
+    /// `None` for a number outside 1 to 127.
     #[must_use]
     pub const fn new(id: u8) -> Option<NodeId> {
         match NonZeroU8::new(id) {
@@ -18,13 +18,13 @@ impl NodeId {
         }
     }
 
-    /// The number, 1 to 127.
+    /// The node-ID as a number, 1 to 127.
     #[must_use]
     pub const fn get(self) -> u8 {
         self.0.get()
     }
 
-    /// The CAN-ID of one of its services in the pre-defined connection set (CiA 301, 7.3.5).
+    /// The CAN-ID of a service of this node in the pre-defined connection set (CiA 301, 7.3.5).
     pub(crate) const fn service(self, function: u16) -> CanId {
         CanId::of_service(function, self.get())
     }

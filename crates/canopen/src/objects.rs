@@ -1,7 +1,7 @@
 //! The objects of CiA 301 and 302 as rows, ready for a table.
 //!
-//! Each function gives one row or the rows of one object. [`rows!`](crate::rows!) puts them in order. What an object does
-//! follows from its index, so a row cannot lack its rule; what it is by default is said here.
+//! Each function returns one row or the rows of one object; [`rows!`](crate::rows!) sorts them. The rule of an object
+//! follows from its index, so no row can lack its rule. The functions define the default values.
 //!
 //! ```
 //! use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
@@ -22,7 +22,7 @@
 //! assert_eq!(DICTIONARY.find(0x1A00, 1).map(|entry| entry.index()), Ok(0x1A00));
 //! ```
 
-// The rows of an object are at most 255.
+// An object has at most 255 rows.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
 #![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
@@ -34,22 +34,22 @@ use crate::dictionary::{Access, DefaultValue, Group, Object, Type};
 pub use pdo::{rpdo, tpdo};
 pub use program::{flash_status, program_control, program_data, program_identification};
 
-/// A value that the device gives.
+/// A read-only value of the device.
 const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
     Object::new(index, sub, name, kind, Access::ReadOnly)
 }
 
-/// A communication parameter.
+/// A communication parameter, stored with its group.
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
     Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Communication)
 }
 
-/// A command that reads 1.
+/// A command entry whose value reads as 1.
 const fn command(index: u16, sub: u8, name: &'static str) -> Object {
     Object::new(index, sub, name, Type::Unsigned32, Access::ReadWrite).value(1)
 }
 
-/// An object of `N` rows: the number of entries, and the same entry again and again.
+/// An object of `N` rows: sub-index 0, and `N` - 1 equal entries.
 const fn list<const N: usize>(number: Object, entry: Object) -> [Object; N] {
     let mut rows = [entry; N];
     rows[0] = number;
@@ -66,13 +66,13 @@ const fn list<const N: usize>(number: Object, entry: Object) -> [Object; N] {
     rows
 }
 
-/// 1000h: the device profile in the low word, what of it the device has in the high word.
+/// 1000h: the device profile in the low word, additional information of the profile in the high word.
 #[must_use]
 pub const fn device_type(code: u32) -> Object {
     fixed(0x1000, 0, "Device type", Type::Unsigned32).value(code as i64)
 }
 
-/// 1001h.
+/// 1001h, error register.
 #[must_use]
 pub const fn error_register() -> Object {
     fixed(0x1001, 0, "Error register", Type::Unsigned8)
@@ -81,7 +81,7 @@ pub const fn error_register() -> Object {
 /// 1003h with room for `N` - 1 errors, at most ten.
 ///
 /// # Panics
-/// During compilation, for more.
+/// During compilation, for more than ten errors, or for none.
 #[must_use]
 pub const fn error_field<const N: usize>() -> [Object; N] {
     assert!(N >= 2 && N <= 11, "the list has one to ten errors");
@@ -100,31 +100,31 @@ pub const fn sync_consumer() -> [Object; 4] {
     ]
 }
 
-/// A text of at most `capacity` characters; an empty one is filled in by the application.
+/// A string of at most `capacity` characters. If `text` is empty, the application writes the string to the image.
 const fn text(index: u16, name: &'static str, capacity: u8, text: &'static str) -> Object {
     Object::new(index, 0, name, Type::VisibleString(capacity), Access::Const)
         .default(DefaultValue::Text(text))
 }
 
-/// 1008h, at most 32 characters.
+/// 1008h, manufacturer device name, at most 32 characters.
 #[must_use]
 pub const fn device_name(name: &'static str) -> Object {
     text(0x1008, "Manufacturer device name", 32, name)
 }
 
-/// 1009h, at most 32 characters. The application fills in an empty one.
+/// 1009h, manufacturer hardware version, at most 32 characters. If it is empty, the application writes the string.
 #[must_use]
 pub const fn hardware_version(version: &'static str) -> Object {
     text(0x1009, "Manufacturer hardware version", 32, version)
 }
 
-/// 100Ah, at most 50 characters. The application fills in an empty one.
+/// 100Ah, manufacturer software version, at most 50 characters. If it is empty, the application writes the string.
 #[must_use]
 pub const fn software_version(version: &'static str) -> Object {
     text(0x100A, "Manufacturer software version", 50, version)
 }
 
-/// 1010h: store all, the communication and the application parameters.
+/// 1010h: store all parameters (sub-index 1), the communication parameters (2) or the application parameters (3).
 #[must_use]
 pub const fn store_parameters() -> [Object; 4] {
     [
@@ -158,7 +158,7 @@ pub const fn emergency() -> [Object; 2] {
 /// 1016h for `N` - 1 nodes, at most 127.
 ///
 /// # Panics
-/// During compilation, for more.
+/// During compilation, for more than 127 nodes, or for none.
 #[must_use]
 pub const fn heartbeat_consumer<const N: usize>() -> [Object; N] {
     assert!(N >= 2 && N <= 128, "one to 127 nodes are watched");
@@ -166,13 +166,13 @@ pub const fn heartbeat_consumer<const N: usize>() -> [Object; N] {
     list(number, parameter(0x1016, 1, "Watched node and time", Type::Unsigned32))
 }
 
-/// 1017h, in ms; 0 for no heartbeat.
+/// 1017h, producer heartbeat time in ms; 0 for no heartbeat.
 #[must_use]
 pub const fn heartbeat_producer(period: u16) -> Object {
     parameter(0x1017, 0, "Producer heartbeat time", Type::Unsigned16).value(period as i64).unit("ms")
 }
 
-/// 1018h. The serial number, sub-index 4, is the application's to fill in.
+/// 1018h, identity. The application writes the serial number, sub-index 4.
 #[must_use]
 pub const fn identity(vendor: u32, product: u32, revision: u32) -> [Object; 5] {
     [
@@ -184,28 +184,28 @@ pub const fn identity(vendor: u32, product: u32, revision: u32) -> [Object; 5] {
     ]
 }
 
-/// 1029h for communication errors and for those of the device: 0 leads to Pre-operational, 1 changes nothing, 2 leads to
-/// Stopped. The first is 0 by default, the second what is given.
+/// 1029h, for communication errors (sub-index 1) and device errors (2): 0 leads to Pre-operational, 1 changes nothing,
+/// 2 leads to Stopped. The default is 0 for communication errors and `device_error` for device errors.
 #[must_use]
 pub const fn error_behaviour(device_error: u8) -> [Object; 3] {
     [
         Object::highest(0x1029, 2, "Error behaviour"),
-        // 255 is refused, 3 to 254 are kept and change nothing.
+        // 255 is refused. 3 to 254 are accepted and change nothing.
         parameter(0x1029, 1, "Communication error", Type::Unsigned8).limits(0, 254),
         parameter(0x1029, 2, "Device error", Type::Unsigned8).limits(0, 2).value(device_error as i64),
     ]
 }
 
-/// 1F80h: 8 makes the device start by itself.
+/// 1F80h, NMT start-up: the value 8 makes the device start by itself.
 #[must_use]
 pub const fn start_up() -> Object {
     parameter(0x1F80, 0, "NMT start-up", Type::Unsigned32)
 }
 
-/// 1FA0h: the objects that the multiplexed PDO in scanner mode reads in turn, `N` - 1 of them.
+/// 1FA0h, object scanner list of `N` - 1 lines: the objects of the multiplexed TPDO in source address mode.
 ///
 /// # Panics
-/// During compilation, for more than 254.
+/// During compilation, for more than 254 lines, or for none.
 #[must_use]
 pub const fn scanner_list<const N: usize>() -> [Object; N] {
     assert!(N >= 2 && N <= 255, "one to 254 objects are scanned");
@@ -213,10 +213,11 @@ pub const fn scanner_list<const N: usize>() -> [Object; N] {
     list(number, parameter(0x1FA0, 1, "Scanned objects", Type::Unsigned32))
 }
 
-/// 1FD0h: where the objects of multiplexed PDOs in source address mode go, `N` - 1 lines.
+/// 1FD0h, object dispatching list of `N` - 1 lines: destinations of objects from multiplexed PDOs in source address
+/// mode.
 ///
 /// # Panics
-/// During compilation, for more than 254.
+/// During compilation, for more than 254 lines, or for none.
 #[must_use]
 pub const fn dispatching_list<const N: usize>() -> [Object; N] {
     assert!(N >= 2 && N <= 255, "the list has one to 254 lines");
@@ -224,8 +225,8 @@ pub const fn dispatching_list<const N: usize>() -> [Object; N] {
     list(number, parameter(0x1FD0, 1, "Dispatched objects", Type::Unsigned64))
 }
 
-/// The default of a row replaced: for a transmission type (`sub` 2), an inhibit time (3, TPDO only) or an event timer (5) of a
-/// PDO, or for another sub-index of the first object of these rows.
+/// Replaces the default of a row of the first object in `rows`. For a PDO, `sub` is 2 for the transmission type, 3 for
+/// the inhibit time (TPDO only) and 5 for the event timer.
 ///
 /// # Panics
 /// During compilation, when there is no such row.
@@ -254,7 +255,8 @@ pub const fn sorted<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
     rows
 }
 
-/// A table of rows from its parts, in any order: arrays and slices of [`Object`](crate::dictionary::Object).
+/// Builds a sorted table of rows from parts in any order: arrays and slices of
+/// [`Object`](crate::dictionary::Object).
 #[macro_export]
 macro_rules! rows {
     ($($part:expr),+ $(,)?) => {{

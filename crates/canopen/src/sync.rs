@@ -1,4 +1,4 @@
-//! SYNC consumer (CiA 301, 7.2.5): which frames are the SYNC, whether it comes in time, and the window after it.
+//! SYNC consumer (CiA 301, 7.2.5): recognises SYNC messages, monitors their period and the synchronous window.
 
 use crate::sdo::Abort;
 use crate::{CanId, CobId, Duration, Frame, Instant};
@@ -6,33 +6,33 @@ use crate::{CanId, CobId, Duration, Frame, Instant};
 /// A SYNC message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Sync {
-    /// Its counter, where 1019h asks for one.
+    /// The counter, if 1019h requires one.
     pub(crate) counter: Option<u8>,
 }
 
-/// A SYNC of another length than 1019h asks for.
+/// A SYNC whose length is not as 1019h requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct WrongLength;
 
-/// What the dictionary says about SYNC.
+/// The SYNC objects of the dictionary.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// 1005h.
+    /// 1005h, COB-ID of SYNC.
     pub(crate) cob_id: u32,
-    /// 1006h: how often it comes, in us; 0 when nobody cares.
+    /// 1006h, communication cycle period in us; 0 for no monitoring.
     pub(crate) period: u32,
-    /// 1007h: how long after it synchronous PDOs are good, in us; 0 for up to the next.
+    /// 1007h, synchronous window length in us; 0 for a window until the next SYNC.
     pub(crate) window: u32,
-    /// 1019h: 0 for no counter.
+    /// 1019h, synchronous counter overflow value; 0 for no counter.
     pub(crate) overflow: u8,
 }
 
-/// Recognises the SYNC message and watches its period and its window.
+/// Recognises SYNC messages and monitors period and window.
 #[derive(Debug)]
 pub(crate) struct Consumer {
     id: CanId,
     settings: Settings,
-    /// When the next SYNC is missing; `NEVER` before the first.
+    /// When the next SYNC is missing; `NEVER` before the first SYNC.
     due: Instant,
     window_end: Instant,
     is_missing: bool,
@@ -49,14 +49,14 @@ impl Consumer {
         }
     }
 
-    /// Takes new settings. The period is watched from the next SYNC on.
+    /// Takes new settings. Monitoring begins with the next SYNC.
     pub(crate) fn configure(&mut self, settings: Settings) {
         self.id = CobId::parse(settings.cob_id).map_or(self.id, |cob_id| cob_id.id);
         self.settings = settings;
         self.stop();
     }
 
-    /// Leaving Operational: SYNC means nothing until the next one.
+    /// After a change of the NMT state: period and window begin again with the next SYNC.
     pub(crate) fn stop(&mut self) {
         (self.due, self.window_end, self.is_missing) = (Instant::NEVER, Instant::NEVER, false);
     }
@@ -65,12 +65,12 @@ impl Consumer {
         self.id
     }
 
-    /// A SYNC is a data frame; a remote frame with its identifier is none.
+    /// Whether a frame is a SYNC. A remote frame with the same identifier is not.
     pub(crate) fn accepts(&self, frame: &Frame) -> bool {
         frame.id() == self.id.get() && !frame.is_remote()
     }
 
-    /// Takes a frame that it accepts.
+    /// Takes a SYNC, that is a frame for which `accepts` is `true`.
     pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Result<Sync, WrongLength> {
         let counter = match (frame.data(), self.settings.overflow) {
             ([], 0) => None,
@@ -79,12 +79,12 @@ impl Consumer {
         };
         let Settings { period, window, .. } = self.settings;
         self.window_end = if window == 0 { Instant::NEVER } else { now + Duration(window.into()) };
-        // Half a period late is too late.
+        // A SYNC that is half a period late is missing.
         self.due = if period == 0 { Instant::NEVER } else { now + Duration(u64::from(period) * 3 / 2) };
         Ok(Sync { counter })
     }
 
-    /// Whether synchronous PDOs come too late for the last SYNC.
+    /// Whether the synchronous window after the last SYNC is over.
     pub(crate) fn is_window_over(&self, now: Instant) -> bool {
         now > self.window_end
     }
@@ -94,7 +94,7 @@ impl Consumer {
         self.due
     }
 
-    /// Whether a SYNC has just turned out to be missing.
+    /// Whether a SYNC is missing. Reported once.
     pub(crate) fn expire(&mut self, now: Instant) -> bool {
         let is_missing = now >= self.due;
         if is_missing {
@@ -103,19 +103,20 @@ impl Consumer {
         is_missing
     }
 
-    /// Whether it was missing until now.
+    /// Whether a SYNC was missing before this one. Reported once.
     pub(crate) fn is_back(&mut self) -> bool {
         core::mem::take(&mut self.is_missing)
     }
 }
 
-/// Checks a new value of 1005h. Bit 30 would make the node a producer, which it is not; bit 31 has no meaning.
+/// Checks a new value of 1005h. Bit 30 would make the node a SYNC producer, which is not supported; bit 31 has no
+/// meaning.
 pub(crate) fn check_cob_id(value: u32) -> Result<(), Abort> {
     let cob_id = CobId::parse(value).ok_or(Abort::InvalidValue)?;
     if cob_id.bit30 || cob_id.id.is_restricted() { Err(Abort::InvalidValue) } else { Ok(()) }
 }
 
-/// Checks a new value of 1019h, which is fixed while there is a period (1006h).
+/// Checks a new value of 1019h, which cannot change while there is a period (1006h).
 pub(crate) fn check_overflow(value: u32, period: u32) -> Result<(), Abort> {
     if period != 0 {
         return Err(Abort::DeviceState);

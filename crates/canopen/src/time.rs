@@ -1,8 +1,8 @@
-//! Time as the caller tells it: microseconds, never read from a clock.
+//! Time in microseconds. The caller passes the time to every call; this crate reads no clock.
 
 use core::ops::Add;
 
-/// A span in microseconds.
+/// A time span in microseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Duration(pub u64);
@@ -14,27 +14,27 @@ impl Duration {
         Duration(n.saturating_mul(1_000))
     }
 
-    /// `n` units of 100 us, the unit of inhibit times.
+    /// `n` units of 100 us, the unit of inhibit times (1015h, 1800h..:3).
     #[must_use]
     pub const fn from_inhibit(n: u16) -> Duration {
         Duration(n as u64 * 100)
     }
 
-    /// Whether it is nothing: a timer that is switched off.
+    /// Whether the span is 0: a timer that is switched off.
     #[must_use]
     pub const fn is_zero(self) -> bool {
         self.0 == 0
     }
 }
 
-/// Microseconds since start-up. 64 bits do not wrap in the life of a machine. Nothing comes after
-/// [`NEVER`](Instant::NEVER): adding to it gives no meaningful instant.
+/// Microseconds since start-up. 64 bits do not overflow in the life of a machine. Do not add to
+/// [`NEVER`](Instant::NEVER): the sum is meaningless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(pub u64);
 
 impl Instant {
-    /// Later than anything: no deadline.
+    /// Later than any other instant: no deadline.
     pub const NEVER: Instant = Instant(u64::MAX);
 }
 

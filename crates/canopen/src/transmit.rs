@@ -1,8 +1,8 @@
-//! Where frames go: the driver's transmit queue as the protocol sees it.
+//! The transmit queue of the driver as the protocols use it.
 
 use crate::{Duration, Frame, Instant};
 
-/// The queue has no room; the sender keeps what it wanted to send and tries again.
+/// The queue has no room. The sender keeps the frame and tries again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct QueueFull;
@@ -15,8 +15,8 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others, and that of a
-/// [`ServiceDevice`](crate::ServiceDevice) for two.
+/// A transmit queue. It never blocks. It should hold about twenty frames: a block upload leaves room for ten others, on
+/// a [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
     /// Queues one frame.
     ///
@@ -24,8 +24,8 @@ pub trait Transmit {
     /// `QueueFull` when there is no room; the frame is then not queued.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull>;
 
-    /// Queues a frame with a present state: a heartbeat or a PDO. While the frame waits, a newer frame with the same identifier
-    /// may replace it. A queue without that feature sends both.
+    /// Queues a frame with a present state: a heartbeat or a PDO. While the frame waits, a newer frame with the same
+    /// identifier may replace it. A queue without this feature sends both.
     ///
     /// # Errors
     /// `QueueFull` when there is no room; the frame is then not queued.
@@ -33,8 +33,9 @@ pub trait Transmit {
         self.send(frame)
     }
 
-    /// Queues the boot-up message. No frame that is queued later may be on the bus before it, whatever the identifiers: a node
-    /// says nothing before it has booted up (CiA 301, 7.3.2.2). A queue that keeps the order of its frames needs nothing for it.
+    /// Queues the boot-up message. No frame that is queued later may overtake it, whatever the identifiers: a node must
+    /// not send anything before its boot-up message (CiA 301, 7.3.2.2). A queue that keeps the order of its frames does
+    /// so anyway.
     ///
     /// # Errors
     /// `QueueFull` when there is no room; the frame is then not queued.
@@ -46,26 +47,26 @@ pub trait Transmit {
     fn room(&self) -> usize;
 }
 
-/// One call of the device: its time, and the transmit queue. While the bit rate changes the queue is shut: it takes nothing,
-/// and the senders try again later.
-pub struct Turn<'a, T> {
+/// One call of the device: its time and the transmit queue. While the bit rate changes, the queue is closed: it accepts
+/// no frame, and the senders try again later.
+pub struct Context<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
 }
 
-impl<T: Transmit> Turn<'_, T> {
-    /// Queues a frame; whether there was room.
+impl<T: Transmit> Context<'_, T> {
+    /// Queues a frame. `false` when there is no room.
     pub(crate) fn send(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send(frame).is_ok()
     }
 
-    /// Queues the boot-up message; whether there was room.
+    /// Queues the boot-up message. `false` when there is no room.
     pub(crate) fn send_boot_up(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send_boot_up(frame).is_ok()
     }
 
-    /// Queues a frame that a newer one may replace; whether there was room.
+    /// Queues a frame that a newer frame may replace. `false` when there is no room.
     pub(crate) fn send_state(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send_state(frame).is_ok()
     }

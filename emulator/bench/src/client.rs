@@ -99,7 +99,7 @@ impl Client {
     fn exchange(&mut self, service: &mut impl Service, request: &Frame) -> Result<()> {
         for answer in self.send(Command::Serve, request.id(), request.data())? {
             let taken = service.on_frame(&answer, Instant(self.now));
-            ensure!(taken != Taken::Unfit, "{answer:?} is no answer to {request:?}");
+            ensure!(taken != Taken::Unexpected, "{answer:?} is no answer to {request:?}");
         }
         Ok(())
     }

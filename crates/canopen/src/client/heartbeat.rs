@@ -7,14 +7,14 @@ use crate::{Duration, Frame, Instant, NodeId};
 /// A heartbeat. A boot-up message has the state [`State::Initialising`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// The node that sent it.
+    /// The producer of the heartbeat.
     pub node: NodeId,
-    /// The state of the node.
+    /// The NMT state of the producer.
     pub state: State,
 }
 
 impl Heartbeat {
-    /// `None` for any other frame. A toggle bit, which node guarding has and heartbeats do not, makes it another.
+    /// `None` for any other frame. A frame with a toggle bit is a node guarding response and no heartbeat.
     #[must_use]
     pub fn parse(frame: &Frame) -> Option<Heartbeat> {
         let &[code] = frame.data() else { return None };
@@ -23,29 +23,29 @@ impl Heartbeat {
     }
 }
 
-/// A change that the supervision of a node has found.
+/// A change in the state of a supervised node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The node has booted up.
     BootUp(NodeId),
-    /// The node is in another state than before, or is heard of for the first time.
+    /// The node has changed its state, or its first heartbeat has arrived.
     State(NodeId, State),
-    /// The heartbeat of the node has not come in time.
+    /// The heartbeat of the node has not arrived in time.
     Lost(NodeId),
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Watched {
     node: NodeId,
-    /// In which a heartbeat has to come.
+    /// The longest time between two heartbeats.
     time: Duration,
-    /// `NEVER` before the first heartbeat and after a missing one.
+    /// When the next heartbeat is missing. `NEVER` before the first heartbeat and after a missing one.
     due: Instant,
     /// The newest state; `None` before the first heartbeat and after a missing one.
     state: Option<State>,
 }
 
-/// Supervises the heartbeats of up to `N` nodes. Each is supervised from its first heartbeat on.
+/// Supervises the heartbeats of up to `N` nodes. The supervision of a node begins with its first heartbeat.
 ///
 /// ```
 /// use canopen::client::heartbeat::{Event, Supervisor};
@@ -75,14 +75,14 @@ impl<const N: usize> Default for Supervisor<N> {
 }
 
 impl<const N: usize> Supervisor<N> {
-    /// Supervises nothing yet.
+    /// A supervisor without nodes.
     #[must_use]
     pub const fn new() -> Supervisor<N> {
         Supervisor { nodes: [None; N] }
     }
 
-    /// Supervises a node from now on: a heartbeat has to come within this time after the one before, which is to be
-    /// longer than the period of the producer (1017h). `false` when `N` others are supervised already.
+    /// Supervises a node from now on. `time` is the longest time between two heartbeats; it should be longer than the
+    /// producer heartbeat time (1017h) of the node. `false` when `N` other nodes are supervised already.
     pub fn watch(&mut self, node: NodeId, time: Duration) -> bool {
         self.forget(node);
         let Some(free) = self.nodes.iter_mut().find(|entry| entry.is_none()) else { return false };
@@ -90,7 +90,7 @@ impl<const N: usize> Supervisor<N> {
         true
     }
 
-    /// Supervises a node no longer.
+    /// Ends the supervision of a node.
     pub fn forget(&mut self, node: NodeId) {
         for entry in &mut self.nodes {
             if entry.is_some_and(|watched| watched.node == node) {
@@ -99,13 +99,13 @@ impl<const N: usize> Supervisor<N> {
         }
     }
 
-    /// The newest state of a node; `None` for one that is not supervised or not alive.
+    /// The newest state of a node; `None` when the node is not supervised or its heartbeat is missing.
     #[must_use]
     pub fn state(&self, node: NodeId) -> Option<State> {
         self.nodes.iter().flatten().find(|watched| watched.node == node)?.state
     }
 
-    /// Takes a frame from the bus. A heartbeat that brings nothing new is no event.
+    /// Takes a frame from the bus. A heartbeat with an unchanged state gives no event.
     pub fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<Event> {
         let heard = Heartbeat::parse(frame)?;
         let watched = self.nodes.iter_mut().flatten().find(|watched| watched.node == heard.node)?;
@@ -123,7 +123,7 @@ impl<const N: usize> Supervisor<N> {
         self.nodes.iter().flatten().fold(Instant::NEVER, |due, watched| due.min(watched.due))
     }
 
-    /// A node whose heartbeat is missing. To be asked until there is none.
+    /// Reports one node whose heartbeat is missing. Call again until the result is `None`.
     pub fn expire(&mut self, now: Instant) -> Option<Event> {
         let is_late = |watched: &&mut Watched| watched.due != Instant::NEVER && now >= watched.due;
         let watched = self.nodes.iter_mut().flatten().find(is_late)?;

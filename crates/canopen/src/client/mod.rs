@@ -1,11 +1,11 @@
 //! The other side of the bus: an SDO client, an LSS master, an NMT master and a consumer of heartbeats.
 //!
-//! A device is served by a [`Device`](crate::Device); what configures, watches and updates devices is built from the
-//! pieces of this module. They are for hosts and for controllers alike: nothing here reads a clock, waits, allocates or
-//! panics, whatever a device sends.
+//! A device is served by a [`Device`](crate::Device). Tools that configure, watch and update devices are built from
+//! the pieces of this module, on a host or on a controller: nothing here reads a clock, waits, allocates or panics,
+//! whatever a device sends.
 //!
-//! Everything that takes more than one frame is a [`Service`]: it says what to do next (send a frame, wait until some
-//! instant, done), and is handed the frames that arrive. One loop drives all of them:
+//! Everything that takes more than one frame is a [`Service`]. A service tells its caller the next step (send a frame,
+//! wait until some instant, done) and takes the frames that arrive. One loop drives all services:
 //!
 //! ```
 //! use canopen::client::sdo::{Buffer, Options, Upload};
@@ -26,7 +26,7 @@
 //!         }
 //!     }
 //!
-//!     /// The next frame; `None` when there was none until then.
+//!     /// The next frame; `None` when no frame arrives until then.
 //!     fn receive(&mut self, until: Instant) -> Option<Frame> {
 //!         let frame = self.answer.take();
 //!         self.now = if frame.is_some() { self.now } else { until };

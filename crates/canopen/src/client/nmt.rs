@@ -24,8 +24,8 @@ pub fn command(command: Command, node: Option<NodeId>) -> Frame {
 
 /// Sends a command to one node and waits for the heartbeat or boot-up message that shows its effect.
 ///
-/// The output is the state that shows it, or `None` when nothing was heard in time: a node without a heartbeat
-/// (1017h = 0) shows nothing but its boot-up message.
+/// The output is the state in that message, or `None` when no such message arrived in time. A node without a heartbeat
+/// (1017h = 0) sends nothing but its boot-up message.
 #[derive(Clone, Copy, Debug)]
 pub struct Change {
     command: Command,
@@ -37,13 +37,14 @@ pub struct Change {
 }
 
 impl Change {
-    /// Waits at most this long.
+    /// Waits at most `time` for the effect.
     #[must_use]
     pub const fn new(command: Command, node: NodeId, time: Duration) -> Change {
         Change { command, node, time, until: None, seen: None }
     }
 
-    /// A node that is reset may start by itself before its first heartbeat is heard; its boot-up message comes first.
+    /// Whether a state shows the effect of the command. For a reset, that is the boot-up message only: by its first
+    /// heartbeat, the node may have started itself already.
     fn is_effect(&self, state: State) -> bool {
         match self.command {
             Command::Start => state == State::Operational,

@@ -2,18 +2,18 @@
 
 use crate::{Duration, Frame, Instant};
 
-/// A service under way. It ends by itself: each has a bound on how long it takes, whatever the devices do.
+/// A service under way. Every service ends after a bounded time, whatever the devices do.
 pub trait Service {
     /// Result of the service.
     type Output;
 
-    /// The next step. Received frames are to be handed over before: the answer to a request that is asked for here may
-    /// be among them.
+    /// The next step. Hand over all received frames before this call: one of them may be the answer to a request that
+    /// this call would otherwise repeat.
     ///
-    /// After [`Step::Done`] it says `Done` again.
+    /// After [`Step::Done`], every further call returns `Done` again.
     fn next(&mut self, now: Instant) -> Step<Self::Output>;
 
-    /// Takes a frame from the bus; frames of others are passed over.
+    /// Takes a frame from the bus. Frames that do not belong to the service are ignored.
     fn on_frame(&mut self, frame: &Frame, now: Instant) -> Taken;
 }
 
@@ -21,9 +21,9 @@ pub trait Service {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Step<T> {
-    /// Send this frame. It is asked for once: a caller whose queue is full keeps the frame.
+    /// Send this frame. The service asks only once: a caller with a full queue keeps the frame.
     Send(Frame),
-    /// Hand over the frames that arrive, and ask again at this instant at the latest.
+    /// Hand over the frames that arrive, and call [`Service::next`] again at this instant at the latest.
     Wait(Instant),
     /// The service has ended.
     Done(T),
@@ -32,17 +32,17 @@ pub enum Step<T> {
 /// How a service has used a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
-    /// The frame has brought the service forward.
+    /// The frame was an answer for the service.
     Used,
-    /// The frame is not for this service, or it is one more copy of the last one: a CAN frame whose acknowledgement is
+    /// The frame is not for this service, or it repeats the frame before: a CAN frame whose acknowledgement is
     /// destroyed arrives twice.
     Ignored,
-    /// The frame comes from the right device and does not fit here. It may be a late answer to an earlier request. A
-    /// service that waits in vain after such a frame says that the device does not follow the protocol.
-    Unfit,
+    /// The frame comes from the right device but does not fit the state of the service, such as a late answer to an
+    /// earlier request. If no fitting answer follows, the service reports that the device does not follow the protocol.
+    Unexpected,
 }
 
-/// An instant later by this span; a span that is too long gives `NEVER`.
+/// The instant `span` after `now`; `NEVER` when the sum is too large.
 pub(super) fn later(now: Instant, span: Duration) -> Instant {
     Instant(now.0.saturating_add(span.0))
 }

@@ -1,4 +1,4 @@
-//! The inner device: values, NMT state, heartbeat, and what waits for the caller.
+//! The inner device: values, NMT state, heartbeat, and the actions that wait for the caller.
 
 use super::body::Body;
 use super::state::Pending;
@@ -11,14 +11,15 @@ use crate::{CanId, Instant, NodeId, heartbeat};
 /// Identity object.
 const IDENTITY: u16 = 0x1018;
 
-/// A device of NMT, SDO, heartbeat and LSS, without the last one's state and the SDO server. `I` is the memory of all values.
+/// The part of a device that NMT, SDO, heartbeat and LSS need; `Services` adds the SDO server and the LSS slave.
+/// `I` is the memory of all values.
 #[derive(Debug)]
 pub struct Basic<A, I: ?Sized> {
     pub(super) dictionary: &'static Dictionary,
-    /// `None` for a device that waits to be given one.
+    /// `None` for a device that waits for a node-ID from LSS.
     pub(super) node_id: Option<NodeId>,
     pub(super) state: State,
-    /// Cached next deadlines; `STALE` after a change that may have moved them.
+    /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
     pub(super) process_due: Instant,
     pub(super) services_due: Instant,
     pub(super) heartbeat: heartbeat::Producer,
@@ -63,17 +64,17 @@ impl<A: Application> Basic<A, [u8]> {
         self.state == State::Initialising
     }
 
-    /// The identifier of one of its services; that of no device while it has no node-ID.
+    /// The CAN-ID of a service of this device. Without a node-ID, the CAN-ID for node-ID 0, which no device uses.
     pub(super) fn service(&self, function: u16) -> CanId {
         CanId::of_service(function, self.node_id.map_or(0, NodeId::get))
     }
 
-    /// The services are due at this instant, or earlier.
+    /// Makes the services due at this instant, or earlier.
     pub(super) fn serve_until(&mut self, due: Instant) {
         self.services_due = self.services_due.min(due);
     }
 
-    /// Asks the caller for something.
+    /// Asks the caller for an action.
     pub(super) fn ask(&mut self, action: Action) {
         self.pending.ask(action);
     }
@@ -88,7 +89,7 @@ impl<A: Application> Basic<A, [u8]> {
         self.dictionary.find(index, sub).map_or(absent, |entry| self.word(entry.field))
     }
 
-    /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
+    /// The default value of an integer of at most 32 bits, including the node-ID where the default is relative to it.
     pub(super) fn default_number(&self, entry: &Entry) -> u32 {
         self.dictionary.default_number(entry, self.node_id)
     }

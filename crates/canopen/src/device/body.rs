@@ -1,4 +1,4 @@
-//! The interface between the services and the device that they serve: the inner device, or the outer one around it.
+//! The interface between the services and the device behind them: the inner device, or the outer device around it.
 
 use super::basic::Basic;
 use super::{Application, STALE};
@@ -6,18 +6,18 @@ use crate::dictionary::{Dictionary, Entry};
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
-/// A device without its services. Every method has the default of the inner device; the outer one adds what it has
-/// around the inner one.
+/// A device without its services. The default of every method is the behaviour of the inner device; the outer device
+/// extends it.
 pub trait Body: Sized {
-    /// The product's own code.
+    /// The application code of the product.
     type Application: Application;
     /// The memory of all values.
     type Image;
 
-    /// Frames for which a block upload leaves room in the queue: a heartbeat and an answer of LSS.
+    /// Free places in the transmit queue that a block upload leaves: for a heartbeat and an LSS response.
     const RESERVED_ROOM: usize = 2;
 
     /// A device that has not started.
@@ -26,7 +26,7 @@ pub trait Body: Sized {
     /// The inner device.
     fn basic(&self) -> &Basic<Self::Application, [u8]>;
 
-    /// The inner device, to change it.
+    /// The inner device, mutable.
     fn basic_mut(&mut self) -> &mut Basic<Self::Application, [u8]>;
 
     /// The values of all objects.
@@ -44,33 +44,33 @@ pub trait Body: Sized {
         basic.application.state(state, &mut basic.image);
     }
 
-    /// Follows a change of the NMT state.
+    /// The NMT state has changed to `state`.
     fn entered(&mut self, _state: State) {}
 
-    /// Gives the objects their values of after a reset: all of them, or those of communication.
+    /// Sets objects to their values after a reset: all objects, or the communication objects only.
     fn load_values(&mut self, _everything: bool) {
         let basic = self.basic_mut();
         basic.dictionary.load_defaults(&mut basic.image);
     }
 
-    /// Gives every protocol its parameters.
+    /// Hands all protocols their parameters from the dictionary.
     fn configure(&mut self, _now: Instant) {}
 
-    /// Takes a frame that is neither NMT nor for the services, in a state that has PDOs.
-    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut Turn<'_, impl Transmit>) {}
+    /// Takes a frame that is neither NMT nor for the services. Called in states with PDOs only.
+    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut Context<'_, impl Transmit>) {}
 
-    /// Sends what is due of process data.
-    fn send_process(&mut self, _turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends the process data that is due.
+    fn send_process(&mut self, _turn: &mut Context<'_, impl Transmit>) {
         self.basic_mut().process_due = Instant::NEVER;
     }
 
     /// Takes the heartbeat of another node.
     fn on_heartbeat(&mut self, _frame: &Frame, _now: Instant) {}
 
-    /// Looks for what is due besides SDO, LSS and the own heartbeat.
-    fn poll_errors(&mut self, _turn: &mut Turn<'_, impl Transmit>) {}
+    /// Checks for due work other than SDO, LSS and the heartbeat of the device.
+    fn poll_errors(&mut self, _turn: &mut Context<'_, impl Transmit>) {}
 
-    /// When `poll_errors` has something to do.
+    /// The next deadline of `poll_errors`.
     fn errors_due(&self) -> Instant {
         Instant::NEVER
     }
@@ -80,30 +80,30 @@ pub trait Body: Sized {
         Err(Abort::NoData)
     }
 
-    /// Whether the rule of an entry allows a value. The inner device carries out no command.
+    /// Whether the rule of an entry allows a value. The inner device carries out no commands.
     fn admit(&mut self, entry: &Entry, _value: u32) -> Result<(), Abort> {
         if entry.rule().is_command() { Err(Abort::NotStored) } else { Ok(()) }
     }
 
-    /// Takes note of the new value of an entry with a rule.
-    fn follow(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
+    /// Applies the new value of an entry with a rule.
+    fn value_written(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
 
-    /// An SDO client has written the entry: stores what the application says is stored at once.
+    /// An SDO client has written the entry: stores the groups that the application wants stored at once.
     fn store_at_once(&mut self, _entry: &Entry) -> Result<(), Abort> {
         Ok(())
     }
 
-    /// Begins to store what LSS has configured; whether that is possible.
+    /// Begins to store a configuration from LSS. `false` when storing is not possible.
     fn store_configuration(&mut self, _configuration: Configuration) -> bool {
         false
     }
 
-    /// Whether the response to the request just served has to wait; once.
+    /// Whether the response to the request just served has to wait. Returns `true` once.
     fn take_deferred(&mut self) -> bool {
         false
     }
 
-    /// Identifiers of the heartbeats that are watched.
+    /// CAN-IDs of the heartbeats that are monitored.
     fn watched_ids(&self) -> impl Iterator<Item = CanId> {
         core::iter::empty()
     }

@@ -1,9 +1,9 @@
-//! TPDOs that tell events: the application has the events, and gives one whenever the TPDO may be sent.
+//! TPDOs that send events: the application keeps the events, and gives one whenever the TPDO may be sent.
 
 use super::full::Full;
 use super::{Application, STALE};
 use crate::pdo::Chain;
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{Instant, Transmit};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
@@ -18,43 +18,43 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Sends what waits with the application, as far as it may be sent. When to ask again.
+    /// Sends the waiting events of the application as far as they may be sent. Returns when to call again.
     #[inline]
-    pub(super) fn send_events(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
-        if self.tells_events && self.basic.state.has_pdos() {
-            self.ask_for_events(turn)
+    pub(super) fn send_events(&mut self, context: &mut Context<'_, impl Transmit>) -> Instant {
+        if self.sends_events && self.basic.state.has_pdos() {
+            self.ask_for_events(context)
         } else {
             Instant::NEVER
         }
     }
 
     #[inline(never)]
-    fn ask_for_events(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
+    fn ask_for_events(&mut self, context: &mut Context<'_, impl Transmit>) -> Instant {
         let mut due = Instant::NEVER;
         for place in 0..self.tpdos.len() {
-            while self.tell_event(place, turn) {}
+            while self.send_event(place, context) {}
             due = due.min(self.tpdos.get(place).map_or(Instant::NEVER, crate::pdo::Tpdo::event_due));
         }
         due
     }
 
-    /// Whether an event of the TPDO was sent.
-    fn tell_event(&mut self, place: usize, turn: &mut Turn<'_, impl Transmit>) -> bool {
+    /// Sends one event of the TPDO, if the application has any. Returns whether an event was sent.
+    fn send_event(&mut self, place: usize, context: &mut Context<'_, impl Transmit>) -> bool {
         let Some(tpdo) = self.tpdos.get_mut(place) else { return false };
-        let Some(number) = tpdo.asks_for_event(turn) else { return false };
+        let Some(number) = tpdo.asks_for_event(context) else { return false };
         let is_event = self.basic.application.next_event(number, &mut self.basic.image);
-        tpdo.take_event(is_event, &self.basic.image, turn);
+        tpdo.take_event(is_event, &self.basic.image, context);
         is_event
     }
 
-    /// A SYNC sends one event of each TPDO that the SYNC concerns.
-    pub(super) fn send_events_with_sync(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends one event of each TPDO that the SYNC triggers.
+    pub(super) fn send_events_with_sync(&mut self, context: &mut Context<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Valid)) {
             links = tpdo.links;
             if let Some(number) = tpdo.asks_with_sync() {
                 let is_event = self.basic.application.next_event(number, &mut self.basic.image);
-                tpdo.take_event(is_event, &self.basic.image, turn);
+                tpdo.take_event(is_event, &self.basic.image, context);
             }
         }
     }

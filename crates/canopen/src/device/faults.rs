@@ -1,4 +1,4 @@
-//! Faults in the device: those of the bus and of the application, and what follows from an error (object 1029h).
+//! Faults of the bus and of the application, and the reaction to an error (object 1029h).
 
 use super::body::Body;
 use super::full::Full;
@@ -32,8 +32,9 @@ pub enum BusEvent {
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Device<A, N, T, R, W, M>
 {
-    /// Takes what the CAN controller reports: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
-    /// communication error. A warning has no emergency code: the node works, and error passive would follow.
+    /// Takes an event of the CAN controller: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
+    /// communication error. A warning has no emergency code, because the node still works; a worse state is reported as
+    /// error passive.
     pub fn on_bus(&mut self, event: BusEvent, now: Instant) -> Next {
         let body = &mut self.body;
         match event {
@@ -49,8 +50,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.process_next()
     }
 
-    /// Sets or clears a fault of the application, by its number in [`Application::CONDITIONS`]. It is signalled once, until
-    /// it is cleared.
+    /// Sets or clears a fault of the application, by its number in [`Application::CONDITIONS`]. A fault is signalled
+    /// once, until it is cleared.
     pub fn set_condition(&mut self, number: u8, active: bool, now: Instant) -> Next {
         self.body.set_fault(Fault::Application(number), active, now);
         self.process_next()
@@ -79,7 +80,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// That the node was off the bus can only be said afterwards.
+    /// Reports bus-off after the recovery: during bus-off, the node cannot send.
     fn recover(&mut self, now: Instant) {
         if core::mem::take(&mut self.is_bus_off) {
             self.raise(Fault::BusOffRecovered, now);
@@ -88,14 +89,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.clear(Fault::BusOffRecovered, now);
     }
 
-    /// Reports a fault that is over at once.
+    /// Reports a fault that is over immediately.
     #[inline(never)]
     pub(super) fn report(&mut self, fault: Fault, now: Instant) {
         self.raise(fault, now);
         self.clear(fault, now);
     }
 
-    // Called from many places that are in no hurry.
+    // Not inlined: many callers, none of them time-critical.
     #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
         if self.emcy.raise(fault, now) {

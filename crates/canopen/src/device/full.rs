@@ -10,10 +10,10 @@ use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
 use crate::sdo::Abort;
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, NodeId, Transmit, emcy, heartbeat, sync};
 
-/// All of a device but its services. The parameters are those of [`Device`](super::Device).
+/// A complete device without its services. The parameters are those of [`Device`](super::Device).
 #[derive(Debug)]
 pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> {
     pub(super) basic: Basic<A, [u8; N]>,
@@ -22,21 +22,21 @@ pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usiz
     pub(super) emcy: emcy::Producer,
     pub(super) tpdos: [Tpdo; T],
     pub(super) rpdos: [Rpdo; R],
-    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits: most frames for other nodes are not in
-    /// the set, and need no further look.
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
+    /// in the set and need no further check.
     pub(super) rpdo_filter: u32,
     pub(super) scanner: Scanner<M>,
-    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and place.
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
     pub(super) all_nodes: Option<(CanId, u16)>,
-    /// One of the TPDOs tells events.
-    pub(super) tells_events: bool,
-    /// Where the chains of PDOs begin.
+    /// Whether any TPDO sends events.
+    pub(super) sends_events: bool,
+    /// The first PDOs of the chains.
     pub(super) first_tpdos: Links,
     pub(super) first_rpdos: Links,
     pub(super) jobs: store::Jobs,
-    /// The groups of which the defaults hold although values are stored.
+    /// The groups whose stored values could not be loaded: the defaults are in use.
     pub(super) lost: Groups,
-    /// The groups of which older values hold than those that were stored last.
+    /// The groups whose newest stored values could not be loaded: the values of the save before are in use.
     pub(super) older: Groups,
     pub(super) is_bus_off: bool,
 }
@@ -47,7 +47,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     type Application = A;
     type Image = [u8; N];
 
-    /// All PDOs of a SYNC, a heartbeat, an EMCY.
+    /// Free places for all PDOs of a SYNC, a heartbeat and an EMCY.
     const RESERVED_ROOM: usize = 10;
 
     fn new(dictionary: &'static Dictionary, node_id: Option<NodeId>, application: A) -> Self {
@@ -62,7 +62,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             rpdo_filter: 0,
             scanner: Scanner::new(),
             all_nodes: None,
-            tells_events: false,
+            sends_events: false,
             first_tpdos: Links::END,
             first_rpdos: Links::END,
             jobs: store::Jobs::new(),
@@ -115,17 +115,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.report_stored(now);
         self.update_error_register();
         if self.basic().number(0x1F80, 0) == SELF_START {
-            self.basic.pending.with_values = Some(State::Operational);
+            self.basic.pending.self_start_state = Some(State::Operational);
         }
     }
 
-    fn on_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
-        self.take_pdo_frame(frame, turn);
+    fn on_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+        self.take_pdo_frame(frame, context);
     }
 
-    fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.basic.process_due {
-            self.run_process(turn);
+    fn send_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now >= self.basic.process_due {
+            self.run_process(context);
         }
     }
 
@@ -133,13 +133,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.take_heartbeat(frame, now);
     }
 
-    fn poll_errors(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        while let Some(change) = self.watches.expire(turn.now) {
-            self.on_watch(change, turn.now);
+    fn poll_errors(&mut self, context: &mut Context<'_, impl Transmit>) {
+        while let Some(change) = self.watches.expire(context.now) {
+            self.on_watch(change, context.now);
             self.apply_error(ErrorClass::COMMUNICATION);
         }
         if self.basic.state.has_services() {
-            self.emcy.poll(turn);
+            self.emcy.poll(context);
         }
     }
 
@@ -160,8 +160,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.admit_value(entry, value)
     }
 
-    fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.follow_value(entry, value, now);
+    fn value_written(&mut self, entry: &Entry, value: u32, now: Instant) {
+        self.apply_value(entry, value, now);
     }
 
     fn store_at_once(&mut self, entry: &Entry) -> Result<(), Abort> {

@@ -1,36 +1,36 @@
-//! LSS in the device: it works in every NMT state, and without a node-ID it is all there is.
+//! LSS in the device. LSS works in every NMT state; without a node-ID it is the only service.
 
 use super::body::Body;
 use super::{Action, STALE};
 use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{Frame, Instant, NodeId, Transmit};
 
 /// A change of the bit rate (CiA 305, activate bit timing parameters).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Switching {
     No,
-    /// The delay before it: nothing is sent, the bus becomes quiet.
+    /// The delay before the change. Nothing is sent, so that the bus becomes quiet.
     Before(Switch),
-    /// The delay after it: all others change too.
+    /// The delay after the change, until all other nodes have changed too.
     After,
 }
 
 /// The LSS slave and its last response.
 #[derive(Debug)]
-pub(super) struct Layer {
+pub(super) struct LssSlave {
     slave: Slave,
     reply: [u8; 8],
-    /// When to try again, if the response found the queue full.
+    /// When to send the response again that found the queue full.
     reply_due: Instant,
     switching: Switching,
-    /// When the next step of the switching is due.
+    /// When the present delay is over.
     switching_due: Instant,
 }
 
-impl Layer {
-    pub(super) fn new(node_id: Option<NodeId>) -> Layer {
-        Layer {
+impl LssSlave {
+    pub(super) fn new(node_id: Option<NodeId>) -> LssSlave {
+        LssSlave {
             slave: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
             reply: [0; 8],
             reply_due: Instant::NEVER,
@@ -53,7 +53,7 @@ impl Layer {
         self.slave.pending().node_id
     }
 
-    /// Whether the bit rate changes: nothing is sent then.
+    /// Whether a change of the bit rate is under way: nothing is sent during the change.
     pub(super) fn is_switching(&self) -> bool {
         self.switching != Switching::No
     }
@@ -62,7 +62,7 @@ impl Layer {
     pub(super) fn take_frame(
         &mut self,
         frame: &Frame,
-        turn: &mut Turn<'_, impl Transmit>,
+        context: &mut Context<'_, impl Transmit>,
         body: &mut impl Body,
     ) {
         let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
@@ -71,45 +71,45 @@ impl Layer {
         let response = match self.slave.take(request, &identity, basic.node_id) {
             Outcome::Silence => None,
             Outcome::Answer(response) => Some(response),
-            Outcome::Join => {
-                basic.begin_join();
+            Outcome::BootUp => {
+                basic.request_boot_up();
                 None
             }
             Outcome::Switch(switch) => {
                 self.switching = Switching::Before(switch);
-                self.switching_due = turn.now + switch.delay();
+                self.switching_due = context.now + switch.delay();
                 None
             }
-            // The response waits for the end of the job.
+            // The response is sent at the end of the job.
             Outcome::Store(configuration) if body.store_configuration(configuration) => None,
             Outcome::Store(_) => Some(Slave::stored(false)),
         };
         if let Some(response) = response {
-            self.respond(response, turn);
+            self.respond(response, context);
         }
         body.basic_mut().services_due = STALE;
     }
 
-    /// Sends a response. One that still waits is obsolete: its master has gone on.
-    pub(super) fn respond(&mut self, response: Response, turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends a response. It replaces a response that still waits: the master no longer expects the older one.
+    pub(super) fn respond(&mut self, response: Response, context: &mut Context<'_, impl Transmit>) {
         self.reply = response.encode();
-        self.send(turn);
+        self.send(context);
     }
 
     #[inline(never)]
-    fn send(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let is_sent = turn.send(Frame::data_frame(RESPONSE, 8, self.reply));
-        self.reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
+    fn send(&mut self, context: &mut Context<'_, impl Transmit>) {
+        let is_sent = context.send(Frame::data_frame(RESPONSE, 8, self.reply));
+        self.reply_due = if is_sent { Instant::NEVER } else { context.now + RETRY };
     }
 
-    /// Sends a response that found the queue full.
-    pub(super) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.reply_due {
-            self.send(turn);
+    /// Sends the response again that found the queue full.
+    pub(super) fn poll(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now >= self.reply_due {
+            self.send(context);
         }
     }
 
-    /// Goes on with a change of the bit rate. What was held back is sent after it.
+    /// Continues a change of the bit rate. Frames that were held back are sent after the change.
     pub(super) fn poll_switching(&mut self, now: Instant, body: &mut impl Body) {
         if now < self.switching_due {
             return;
@@ -123,7 +123,7 @@ impl Layer {
         };
     }
 
-    /// When `poll` or `poll_switching` has something to do.
+    /// The next deadline of `poll` or `poll_switching`.
     pub(super) fn due(&self) -> Instant {
         self.switching_due.min(self.reply_due)
     }

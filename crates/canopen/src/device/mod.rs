@@ -1,7 +1,7 @@
-//! The CANopen device: the protocols, the dictionary's values and what connects them.
+//! The CANopen device: the protocols, the values of the dictionary, and the connections between them.
 //!
-//! There are two devices, one inside the other. [`ServiceDevice`] has NMT, SDO, heartbeat and LSS. [`Device`] has all of that, and
-//! around it PDO, SYNC, EMCY, the heartbeats of other nodes and stored parameters.
+//! There are two devices, one inside the other. [`ServiceDevice`] has NMT, SDO, heartbeat and LSS. [`Device`] adds PDO,
+//! SYNC, EMCY, monitoring of other nodes' heartbeats and stored parameters.
 //!
 //! ```text
 //! Node<Full> = Device                           Node<Basic> = ServiceDevice
@@ -14,10 +14,10 @@
 //! └─────────────────────────────────────────┘
 //! ```
 //!
-//! Without a node-ID a device hears LSS and nothing else.
+//! Without a node-ID, a device reacts to LSS only.
 //!
-//! Every call returns what follows from the call ([`Next`]). One caller uses `on_frame` and `poll`; two callers of two
-//! priorities share the device by its halves, one for process data and one for services.
+//! Every call returns the next deadlines and an action for the caller ([`Next`]). A single caller uses `on_frame` and
+//! `poll`. Two callers of different priority share the device by its halves, one for process data and one for services.
 
 mod application;
 mod basic;
@@ -52,33 +52,34 @@ use body::Body;
 use full::Full;
 use services::Services;
 
-/// A device with an application `A`, and room for what its dictionary has: an image of `N` bytes, `T` TPDOs, `R` RPDOs, `W`
-/// heartbeats to watch, and `M` objects that a multiplexed TPDO sends.
+/// A device with an application `A`, and room for its dictionary: an image of `N` bytes, `T` TPDOs, `R` RPDOs, `W`
+/// heartbeats to monitor, and `M` objects that a multiplexed TPDO sends.
 ///
-/// [`device!`](crate::device!) gives the type of a table of rows. PDOs, heartbeats and objects beyond the room do not work.
+/// [`device!`](crate::device!) gives the type for a table of rows. PDOs, heartbeats and objects beyond the room do not
+/// work.
 pub type Device<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> =
     Node<Full<A, N, T, R, W, M>>;
 
-/// A device with NMT, SDO, heartbeat and LSS alone, such as a bootloader: an application `A` and an image of `N` bytes.
+/// A device with NMT, SDO, heartbeat and LSS only, such as a bootloader: an application `A` and an image of `N` bytes.
 ///
-/// [`service_device!`](crate::service_device!) gives the type of a table of rows. Rows of the other services hold values and
-/// do nothing.
+/// [`service_device!`](crate::service_device!) gives the type for a table of rows. Rows of other services hold values
+/// without any effect.
 pub type ServiceDevice<A, const N: usize> = Node<Basic<A, [u8; N]>>;
 
-/// A device: its services, and what they serve. Named as [`Device`] or [`ServiceDevice`].
+/// A device: its services, and the device body that they serve. Used as [`Device`] or [`ServiceDevice`].
 #[derive(Debug)]
-#[repr(C)] // The services first: they are short, and an instruction reaches what is near the beginning.
+#[repr(C)] // The services are short. At the start of the structure, an instruction reaches their fields directly.
 pub struct Node<B> {
     services: Services,
     body: B,
 }
 
-/// A deadline in the past: the next poll looks at everything.
+/// A deadline in the past: the next poll checks everything.
 const STALE: Instant = Instant(0);
 
 impl<B: Body> Node<B> {
-    /// A device that has not started: silent and deaf until [`start`](Node::start). It stores its bit rate for LSS
-    /// only; 1 Mbit/s unless [`with_bit_rate`](Node::with_bit_rate) says otherwise.
+    /// A device that has not started: it neither sends nor receives until [`start`](Node::start). The bit rate is only
+    /// for LSS to store; it is 1 Mbit/s unless [`with_bit_rate`](Node::with_bit_rate) sets another one.
     pub fn new(
         dictionary: &'static Dictionary,
         node_id: impl Into<Option<NodeId>>,
@@ -88,7 +89,7 @@ impl<B: Body> Node<B> {
         Node { services: Services::new(node_id), body: B::new(dictionary, node_id, application) }
     }
 
-    /// Takes the bit rate that is configured, for LSS to store along with a new node-ID.
+    /// Sets the configured bit rate. LSS stores it together with a new node-ID.
     #[must_use]
     pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Node<B> {
         self.services.set_bit_rate(bit_rate);
@@ -113,8 +114,8 @@ impl<B: Body> Node<B> {
         self.body.image()
     }
 
-    /// Lets the application show its state in the image. What of it is mapped is sent with the next
-    /// [`publish`](Device::publish) or timer.
+    /// Lets the application write its state to the image. Mapped values among them are sent with the next
+    /// [`publish`](Device::publish) or event timer.
     pub fn show(&mut self, show: impl FnOnce(&mut B::Application, &mut [u8])) {
         let basic = self.body.basic_mut();
         show(&mut basic.application, &mut basic.image);
@@ -126,7 +127,7 @@ impl<B: Body> Node<B> {
         &self.body.basic().application
     }
 
-    /// The application, to change its state.
+    /// The application, mutable.
     pub fn application_mut(&mut self) -> &mut B::Application {
         &mut self.body.basic_mut().application
     }

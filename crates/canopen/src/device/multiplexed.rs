@@ -1,4 +1,4 @@
-//! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
+//! Multiplexed PDOs in the device: the objects that the producer monitors, and the destination of a received object.
 
 use super::Application;
 use super::body::Body;
@@ -11,16 +11,16 @@ use crate::{Instant, NodeId};
 
 /// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
 const SCANNER_LIST: u16 = 0x1FA0;
-/// Object dispatching list (CiA 301, 7.5.2.45): where the objects of other nodes go in source address mode.
+/// Object dispatching list (CiA 301, 7.5.2.45): destinations of other nodes' objects in source address mode.
 const DISPATCHING_LIST: u16 = 0x1FD0;
-/// The longest value that such a PDO carries.
+/// The longest value in a multiplexed PDO, in bytes.
 const LONGEST: u8 = 4;
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    /// Gives the producer its settings and its objects, after any change that may concern it. A change of another PDO sends
-    /// nothing: what was sent is still so.
+    /// Gives the producer its settings and its objects, after any change that may affect them. Unchanged settings keep
+    /// the record of the values that have been sent, so nothing is sent again.
     pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
         let addressing = settings.map(|settings| settings.addressing);
         let is_new = !self.scanner.has(settings);
@@ -33,30 +33,30 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         if addressing == Some(Addressing::Destination) {
-            self.choose_watched();
+            self.select_watched();
         }
         if is_new && self.basic.state.has_pdos() {
             self.scanner.start();
         }
     }
 
-    /// All that can be sent.
+    /// Monitors all objects that can be sent.
     fn watch_all(&mut self) {
         for entry in self.basic.dictionary.entries() {
             self.watch_entry(&entry);
         }
     }
 
-    /// Selects the objects to send: those that the application broadcasts and that no TPDO carries. Objects of a TPDO that is
-    /// switched off are not sent either: whoever switches a TPDO off does not want its objects in another frame.
-    fn choose_watched(&mut self) {
+    /// Selects the objects to send: the application broadcasts them, and no TPDO maps them. A TPDO that is switched off
+    /// counts too: switching it off must not send its objects in another frame.
+    fn select_watched(&mut self) {
         let (application, image) = (&self.basic.application, &self.basic.image);
-        self.scanner.choose(|at| application.broadcasts(at, image));
-        self.leave_out_mapped();
-        self.scanner.forget_others();
+        self.scanner.select(|at| application.broadcasts(at, image));
+        self.deselect_mapped();
+        self.scanner.forget_deselected();
     }
 
-    /// Watches the objects of the scanner list: each line is a block of sub-indexes of one object.
+    /// Monitors the objects of the scanner list. Each line is a block of sub-indexes of one object.
     fn watch_listed(&mut self) {
         let [count, ..] = self.basic().number(SCANNER_LIST, 0).to_le_bytes();
         for line in 0..count {
@@ -76,7 +76,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes a received multiplexed PDO of a kind that the RPDO is for.
+    /// Takes a received multiplexed PDO. `addressing` is the mode of the RPDO; a frame of the other mode is ignored.
     pub(super) fn on_mpdo(&mut self, frame: [u8; 8], addressing: Addressing, now: Instant) {
         let Some(mpdo) = Mpdo::parse(frame) else { return };
         match (mpdo.address, addressing) {
@@ -90,7 +90,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// An object that is not there is an error for the one node that is meant; of all nodes some may have it.
+    /// Takes an object for this node or for all nodes. A missing object is an error only if this node alone is
+    /// addressed.
     fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Instant) {
         let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
         if !is_taken && node.is_some() {
@@ -98,7 +99,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Whether the object exists and takes process data.
+    /// Stores the value, if the object exists and accepts process data. Returns whether it does.
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
         let entry = self.basic.dictionary.find(at.index, at.sub).ok();
         let entry =
@@ -130,7 +131,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 }
 
-/// A line of the dispatching list: a block of a sender's sub-indexes, and where the block goes.
+/// A line of the dispatching list: a block of sub-indexes of the sender, and their destination.
 struct DispatchingLine {
     sender: NodeId,
     remote: Multiplexer,
@@ -139,7 +140,7 @@ struct DispatchingLine {
 }
 
 impl DispatchingLine {
-    /// Where a sender's object goes, if it is in the block.
+    /// The destination of an object, if the block contains it.
     fn target(&self, at: Multiplexer, sender: NodeId) -> Option<Multiplexer> {
         let offset = at.sub.checked_sub(self.remote.sub)?;
         let is_meant = sender == self.sender && at.index == self.remote.index && offset < self.size;

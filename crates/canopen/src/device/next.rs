@@ -4,50 +4,51 @@ use super::Job;
 use crate::Instant;
 use crate::lss::BitRate;
 
-/// Result of a call: when to call again, and an action that is left to the caller.
+/// Result of a call: when to call again, and an action for the caller.
 ///
-/// A caller for both halves does three things with it: the action, new parameters, and a sleep until [`Next::due`] or
-/// the next frame. Of two callers, one for process data and one for services, each sleeps until the instant of its own
-/// half and wakes the other one when that one's instant has come.
+/// A caller of both halves carries out the action, handles new parameters, and sleeps until [`Next::due`] or the next
+/// frame. Of two callers, one for process data and one for services, each sleeps until the deadline of its own half,
+/// and wakes the other caller when the other deadline has passed.
 ///
-/// Actions and parameters are handed over by `start`, `on_service_frame` and `poll_services` (and so by `on_frame` and
-/// `poll`) and by no other call: where something waits after another call, the services are due at once.
+/// Only `start`, `on_service_frame` and `poll_services` (and so `on_frame` and `poll`) return actions and parameters.
+/// If something waits after another call, the services are due at once.
 #[must_use = "the deadlines have moved, and an action may be left to the caller"]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Next {
-    /// When `poll_process` has something to do.
+    /// The next deadline of `poll_process`.
     pub process: Instant,
-    /// When `poll_services` has something to do.
+    /// The next deadline of `poll_services`.
     pub services: Instant,
-    /// An action for the caller, to be done now. Where more than one action waits, the services are due at once.
+    /// An action to carry out now. If further actions wait, the services are due at once.
     pub action: Option<Action>,
     /// Parameters of the application may have changed.
     pub parameters: bool,
 }
 
 impl Next {
-    /// When [`Device::poll`](super::Device::poll) has something to do.
+    /// The next deadline of [`Device::poll`](super::Device::poll).
     #[must_use]
     pub fn due(&self) -> Instant {
         self.process.min(self.services)
     }
 }
 
-/// Something that is left to the caller.
+/// An action that the caller carries out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
     /// NMT reset node: restart everything, or at least call [`Device::start`](super::Device::start).
     ResetNode,
-    /// NMT reset communication: discard frames that still wait to be sent, then call [`Device::start`](super::Device::start).
+    /// NMT reset communication: discard frames that still wait to be sent, then call
+    /// [`Device::start`](super::Device::start).
     ResetCommunication,
     /// The sets of identifiers to receive have changed.
     Identifiers,
     /// Run the bus at this bit rate from now on.
     BitRate(BitRate),
-    /// Go to the bootloader; the request for it is not answered.
+    /// Start the bootloader. The device does not answer the request.
     Bootloader,
-    /// Store something, then call [`Device::finish`](super::Device::finish).
+    /// Store or restore values, then call [`Device::finish`](super::Device::finish).
     Store(Job),
 }

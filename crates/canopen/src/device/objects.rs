@@ -35,7 +35,7 @@ impl<B: Body> Objects for B {
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
         let found = self.basic().dictionary.find(at.index, at.sub);
-        // By reference: to move it out of the result takes a dozen instructions.
+        // By reference: a move out of the result takes a dozen instructions.
         let entry = found.as_ref().map_err(|abort| *abort)?;
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
@@ -67,7 +67,7 @@ impl<B: Body> Objects for B {
     }
 }
 
-/// A download to a domain that came in one piece.
+/// Writes a domain whose download arrived in one piece.
 fn write_domain(body: &mut impl Body, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
     let application = &mut body.basic_mut().application;
     application.write_domain(at, Part::Begin(Some(bytes.len())))?;
@@ -75,7 +75,7 @@ fn write_domain(body: &mut impl Body, at: Multiplexer, bytes: &[u8]) -> Result<(
     application.write_domain(at, Part::End(bytes.len()))
 }
 
-/// Replaces the value of an entry that does more than holding one.
+/// Writes an entry whose rule does more than storing a value.
 #[inline(never)]
 fn write_by_rule(
     body: &mut impl Body,
@@ -99,7 +99,7 @@ fn write_by_rule(
     if rule == Rule::HeartbeatTime {
         basic.heartbeat.set_period(low_half(value), now);
     }
-    body.follow(entry, value, now);
+    body.value_written(entry, value, now);
     let basic = body.basic_mut();
     (basic.process_due, basic.services_due) = (STALE, STALE);
     Ok(())
@@ -133,9 +133,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Hands a new value to the protocol that uses it.
-    pub(super) fn follow_value(&mut self, entry: &Entry, value: u32, now: Instant) {
+    pub(super) fn apply_value(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
-            Rule::Application => self.follow_application(now),
+            Rule::Application => self.apply_application_changes(now),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
@@ -162,7 +162,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 }
 
-/// A string as an upload gives it: it ends where its zeros begin.
+/// The string that an upload returns: without the zeros at its end.
 fn text(value: &[u8]) -> &[u8] {
     value.split(|&byte| byte == 0).next().unwrap_or(value)
 }

@@ -1,7 +1,8 @@
-//! The PDO objects 1400h.., 1600h.., 1800h.. and 1A00h..: their interlocks, and from them the settings of a PDO.
+//! The PDO objects 1400h.., 1600h.., 1800h.. and 1A00h..: checks of a write, and the settings of a PDO from its
+//! objects.
 //!
-//! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
-//! entries, count, COB-ID valid.
+//! A new mapping takes five steps (CiA 301, 7.5.2.36), and each step is a condition of the next: COB-ID invalid, count
+//! 0, entries, count, COB-ID valid.
 
 use super::Application;
 use super::body::Body;
@@ -17,15 +18,15 @@ use crate::{CobId, Instant};
 
 /// A PDO of the dictionary, by the index of its communication object.
 ///
-/// A dictionary places its PDOs at any of the 512 numbers. In the device they have the first places, in the order of
-/// their numbers ([`Full::place`]).
+/// A dictionary may use any of the 512 PDO numbers. The device keeps its PDOs in the first elements of an array, in the
+/// order of their numbers ([`Full::place`]).
 #[derive(Clone, Copy, Debug)]
 struct Pdo {
     communication: u16,
 }
 
 impl Pdo {
-    /// To which an entry belongs.
+    /// The PDO to which an entry belongs.
     fn of(entry: &Entry) -> Pdo {
         match entry.rule() {
             Rule::EventTimerOf(number) => Pdo { communication: 0x1800 | u16::from(number) },
@@ -33,7 +34,7 @@ impl Pdo {
         }
     }
 
-    /// 1 to 512.
+    /// The number of the PDO, 1 to 512.
     fn number(self) -> u16 {
         (self.communication & 0x01FF) + 1
     }
@@ -78,8 +79,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.configure_scanner(self.scanner_settings());
     }
 
-    /// Gives the PDOs their settings that the application has switched on or off.
-    pub(super) fn follow_application(&mut self, now: Instant) {
+    /// Reconfigures the PDOs that the application has switched on or off.
+    pub(super) fn apply_application_changes(&mut self, now: Instant) {
         let mut has_changed = false;
         for direction in [Direction::Transmit, Direction::Receive] {
             for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
@@ -96,7 +97,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.configure_scanner(self.scanner_settings());
     }
 
-    /// Whether the objects say that the PDO is valid.
+    /// Whether the PDO is valid according to its objects.
     fn is_valid(&self, pdo: Pdo) -> bool {
         match pdo.direction() {
             Direction::Transmit => self.tpdo_settings(pdo).is_some(),
@@ -104,7 +105,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Whether the device has it as a valid one.
+    /// Whether the PDO is configured as valid in the device.
     fn is_used(&self, pdo: Pdo, place: u16) -> bool {
         let place = usize::from(place);
         match pdo.direction() {
@@ -113,13 +114,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
+    /// The position of a PDO in the array of the device: its rank among the PDOs of the dictionary in this direction.
     fn place(&self, pdo: Pdo) -> Option<u16> {
         let mut ranked = (0..).zip(Pdo::all(self.basic.dictionary, pdo.direction()));
         ranked.find(|(_, other)| other.communication == pdo.communication).map(|(place, _)| place)
     }
 
-    /// The place of a TPDO by its number, 1 to 512.
+    /// The position of a TPDO by its number, 1 to 512.
     pub(super) fn tpdo_place(&self, number: u16) -> Option<u16> {
         self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
@@ -151,10 +152,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.forget_rpdo_faults(place, now);
     }
 
-    /// Chains the PDOs that are valid, after a change of their settings.
+    /// Links the valid PDOs to chains, after a change of their settings.
     fn link_pdos(&mut self) {
         (self.first_tpdos, self.first_rpdos) = (Links::END, Links::END);
-        self.tells_events = self.tpdos.iter().any(|tpdo| tpdo.events_of().is_some());
+        self.sends_events = self.tpdos.iter().any(|tpdo| tpdo.events_of().is_some());
         for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
@@ -201,19 +202,19 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         RpdoSettings::new(cob_id.id, transmission, deadline, self.content(pdo)?)
     }
 
-    /// COB-ID and transmission type of a PDO that is valid.
+    /// COB-ID and transmission type of a valid PDO.
     fn transmission(&self, pdo: Pdo) -> Option<(CobId, Transmission)> {
         Some((self.cob_id(pdo)?, Transmission::parse(low_byte(self.parameter(pdo, 2)))?))
     }
 
-    /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
+    /// Whether every mapping contains mappable objects only. A stored mapping may come from an older dictionary.
     pub(super) fn mappings_are_sound(&self) -> bool {
         let directions = [Direction::Transmit, Direction::Receive].into_iter();
         let mut pdos = directions.flat_map(|direction| Pdo::all(self.basic.dictionary, direction));
         pdos.all(|pdo| self.content(pdo).is_some())
     }
 
-    /// The one multiplexed TPDO that there can be (CiA 301, 7.2.2.6): the first that is valid.
+    /// The settings of the multiplexed TPDO. Only one can exist (CiA 301, 7.2.2.6): the first valid one is used.
     fn scanner_settings(&self) -> Option<ScannerSettings> {
         Pdo::all(self.basic.dictionary, Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
@@ -233,11 +234,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes the objects of all TPDOs, valid or not, out of the multiplexed one.
-    pub(super) fn leave_out_mapped(&mut self) {
+    /// Excludes the objects of all TPDOs, valid or not, from the multiplexed TPDO.
+    pub(super) fn deselect_mapped(&mut self) {
         for pdo in Pdo::all(self.basic.dictionary, Direction::Transmit) {
             if let Some(Content::Objects(layout)) = self.content(pdo) {
-                self.scanner.leave_out(&layout);
+                self.scanner.deselect(&layout);
             }
         }
     }
@@ -261,12 +262,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.basic().number(pdo.communication, sub)
     }
 
-    /// The COB-ID of a PDO that is valid; one without objects is not.
+    /// The COB-ID of a valid PDO; `None` when the PDO is not valid or has no objects in the dictionary.
     fn cob_id(&self, pdo: Pdo) -> Option<CobId> {
         CobId::parse(self.basic().number_or(pdo.communication, 1, u32::MAX)).filter(|cob_id| !cob_id.bit31)
     }
 
-    /// Whether the rules of a PDO object allow a value: most change only while the PDO is not valid.
+    /// Whether a PDO object accepts a value. Most PDO objects can change only while the PDO is not valid.
     pub(super) fn admit_pdo(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let pdo = Pdo::of(entry);
         let present = self.cob_id(pdo);
@@ -281,10 +282,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// The CAN-ID changes only while the PDO does not exist; to exist, it needs a CAN-ID that is free for PDOs, a
-    /// mapping, and remote frames if its type lives on them. A multiplexed PDO is sent by event.
+    /// The CAN-ID can change only while the PDO is not valid. A valid PDO needs a CAN-ID that CiA 301 does not
+    /// restrict, a mapping, and, for a type that depends on remote frames, remote frames allowed. A multiplexed PDO
+    /// needs an event-driven type.
     ///
-    /// A CAN-ID that a profile has pre-defined never changes, and is free for this PDO whatever CiA 301 says of it.
+    /// A CAN-ID that a profile has pre-defined never changes, and is allowed for this PDO even if CiA 301 restricts it.
     fn admit_cob_id(&self, pdo: Pdo, present: Option<CobId>, entry: &Entry, value: u32) -> Result<(), Abort> {
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
         let is_predefined = entry.rule() == Rule::PdoPredefined;
@@ -304,7 +306,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
     }
 
-    /// An RPDO cannot be asked for, so it has no type that lives on remote frames.
+    /// An RPDO is not requested by remote frames, so its type cannot depend on them.
     fn admit_type(&self, pdo: Pdo, present: Option<CobId>, kind: u8) -> Result<(), Abort> {
         let transmission = Transmission::parse(kind).ok_or(Abort::InvalidValue)?;
         let no_remote = pdo.direction() == Direction::Receive || present.is_some_and(|cob_id| cob_id.bit30);
@@ -316,7 +318,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         Ok(())
     }
 
-    /// A mapping is switched on as a whole: only now is its length known.
+    /// Checks the mapping as a whole: its length is known only when the count is written.
     fn admit_count(&self, pdo: Pdo, count: u8) -> Result<(), Abort> {
         if Addressing::from_count(count).is_some() {
             return Ok(());
@@ -336,12 +338,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 }
 
-/// Entries whose type is UNSIGNED8 have no more.
+/// The value of an entry of type UNSIGNED8.
 fn low_byte(value: u32) -> u8 {
     value.to_le_bytes()[0]
 }
 
-/// Entries whose type is UNSIGNED16 have no more.
+/// The value of an entry of type UNSIGNED16.
 pub(super) fn low_half(value: u32) -> u16 {
     let [low, high, ..] = value.to_le_bytes();
     u16::from_le_bytes([low, high])

@@ -5,11 +5,11 @@ use super::full::Full;
 use super::{Application, Device, Next, Node, STALE};
 use crate::nmt::Command;
 use crate::pdo::{Chain, Rpdo, Tpdo};
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, Transmit};
 
 impl<B: Body> Node<B> {
-    /// Takes a frame, whatever half it is for.
+    /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
@@ -17,7 +17,7 @@ impl<B: Body> Node<B> {
         self.services_next()
     }
 
-    /// Sends what is due in both halves.
+    /// Sends all frames that are due, in both halves.
     #[inline]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let _ = self.poll_process(now, out);
@@ -25,7 +25,7 @@ impl<B: Body> Node<B> {
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
-    // Inlined, so that a caller that drops a part of `Next` does not pay for it; the work itself is a function of its own.
+    // Inlined, so that a caller that ignores a part of `Next` does not pay for it. The work is in a separate function.
     #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
@@ -34,13 +34,13 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let turn = &mut self.services.turn(now, out);
+        let context = &mut self.services.context(now, out);
         if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame);
         } else if self.body.basic().state.has_pdos() {
-            self.body.on_pdo_frame(frame, turn);
+            self.body.on_pdo_frame(frame, context);
         }
-        self.body.send_process(turn);
+        self.body.send_process(context);
     }
 
     #[inline(never)]
@@ -51,12 +51,12 @@ impl<B: Body> Node<B> {
         self.command(command);
     }
 
-    /// Sends what is due of process data.
+    /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().process_due {
-            let turn = &mut self.services.turn(now, out);
-            self.body.send_process(turn);
+            let context = &mut self.services.context(now, out);
+            self.body.send_process(context);
         }
         self.process_next()
     }
@@ -65,8 +65,8 @@ impl<B: Body> Node<B> {
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Device<A, N, T, R, W, M>
 {
-    /// Lets the application update values in the image, and sends what their change triggers. The first call after a start
-    /// is the one with which a device that starts by itself (1F80h) becomes operational.
+    /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
+    /// starts by itself (1F80h), the first `publish` after a start makes the device operational.
     pub fn publish(
         &mut self,
         now: Instant,
@@ -78,10 +78,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.process_next()
     }
 
-    /// Sends a TPDO of type 254 or 255 now, or as soon as its inhibit time is over: an event that the application has
-    /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
+    /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
+    /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
-        let turn = &mut self.services.turn(now, out);
+        let context = &mut self.services.context(now, out);
         let place = self.body.tpdo_place(tpdo);
         if self.body.basic.state.has_pdos()
             && let Some(tpdo) = place.and_then(|place| self.body.tpdos.get_mut(usize::from(place)))
@@ -89,21 +89,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             tpdo.on_event();
             self.body.basic.process_due = STALE;
         }
-        self.body.send_process(turn);
+        self.body.send_process(context);
         self.process_next()
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
-        let turn = &mut self.services.turn(now, out);
-        self.start_by_itself(turn);
+        let context = &mut self.services.context(now, out);
+        self.self_start(context);
         if self.body.basic.state.has_pdos() {
-            self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, turn));
-            let events_due = self.body.send_events(turn);
-            self.body.scanner.on_change(&self.body.basic.image, turn);
+            self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
+            let events_due = self.body.send_events(context);
+            self.body.scanner.on_change(&self.body.basic.image, context);
             self.body.basic.process_due =
                 self.body.basic.process_due.min(self.body.scanner.due()).min(events_due);
         }
-        self.body.send_process(turn);
+        self.body.send_process(context);
     }
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
@@ -112,8 +112,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.own_process_ids().chain(all_nodes)
     }
 
-    /// The identifiers as acceptance filters: each with a mask of the bits to compare. With an RPDO for all nodes
-    /// ([`Application::takes_all_nodes`]) they are fewer by far.
+    /// The identifiers as acceptance filters: each with a mask of the bits to compare. If an RPDO takes the frames of
+    /// all nodes ([`Application::takes_all_nodes`]), there are far fewer filters than identifiers.
     pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
         let all_nodes = self.body.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
         self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
@@ -129,21 +129,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
         if self.sync.accepts(frame) {
-            self.on_sync(frame, turn);
+            self.on_sync(frame, context);
         } else if frame.is_remote() {
             self.each_tpdo(Chain::Valid, |tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
-                    tpdo.on_remote(image, turn);
+                    tpdo.on_remote(image, context);
                 }
             });
         } else {
-            self.on_rpdo(frame, turn.now);
+            self.on_rpdo(frame, context.now);
         }
     }
 
-    /// Visits the TPDOs of a chain. What one of them could not send at once moves the next deadline.
+    /// Visits the TPDOs of a chain. A TPDO that could not be sent at once makes the process data due.
     pub(super) fn each_tpdo(&mut self, chain: Chain, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.get_mut(links.next(chain)) {
@@ -156,15 +156,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     #[inline(never)]
-    pub(super) fn run_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        self.poll_sync(turn.now);
-        let mut due = self.poll_rpdos(turn.now);
+    pub(super) fn run_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+        self.poll_sync(context.now);
+        let mut due = self.poll_rpdos(context.now);
         self.each_tpdo(Chain::Valid, |tpdo, image| {
-            tpdo.poll(image, turn);
+            tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });
-        due = due.min(self.send_events(turn));
-        self.scanner.poll(&self.basic.image, turn);
+        due = due.min(self.send_events(context));
+        self.scanner.poll(&self.basic.image, context);
         self.basic.process_due = due.min(self.scanner.due()).min(self.sync.due());
     }
 }

@@ -1,4 +1,4 @@
-//! RPDOs in the device: reception, deadlines, and the faults of each.
+//! RPDOs in the device: reception, deadlines and faults.
 
 use super::body::Body;
 use super::full::Full;
@@ -11,7 +11,7 @@ use crate::{Frame, Instant};
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    /// Takes a data frame that may be one of the RPDOs. A good one clears the faults of its PDO.
+    /// Takes a data frame that may be an RPDO. A valid frame clears the faults of its RPDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
@@ -25,7 +25,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.take_rpdo(place, frame, now);
             }
         }
-        // A node that has no RPDO of its own is left to the one for all nodes.
+        // A frame that has no RPDO of its own goes to the RPDO for all nodes.
         if let Some((id, place)) = self.all_nodes
             && !is_own
             && id.is_of_same_service(frame.id())
@@ -51,7 +51,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes the data of an RPDO into the image, and tells the application.
+    /// Writes the data of an RPDO to the image, and notifies the application.
     pub(super) fn store_rpdo(&mut self, place: usize, data: [u8; 8]) {
         let Some(rpdo) = self.rpdos.get(place) else { return };
         let index = rpdo.index;
@@ -62,8 +62,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.basic.application.received((index & 0x1FF) + 1, &mut self.basic.image);
     }
 
-    /// Takes the data of an RPDO whose objects have limits or rules: each value is checked as in an SDO download, and a value
-    /// that is refused is left out.
+    /// Writes the data of an RPDO whose objects have limits or rules. Each value is checked as in an SDO download; a
+    /// refused value is left out.
     #[inline(never)]
     fn store_checked(&mut self, communication: u16, data: [u8; 8]) {
         let (mapping, mut rest) = (communication | 0x0200, data.as_slice());
@@ -80,7 +80,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes a value that a PDO brings, if the object takes it.
+    /// Writes a value from a PDO, if the object accepts it.
     pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) {
         let is_allowed = entry.check_value(little_endian(bytes)).is_ok()
             && (entry.rule() != Rule::Application
@@ -119,7 +119,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if active { self.raise(fault, now) } else { self.clear(fault, now) }
     }
 
-    /// Looks for RPDOs that are missing. The next instant at which one is.
+    /// Detects missing RPDOs. Returns the next deadline.
     pub(super) fn poll_rpdos(&mut self, now: Instant) -> Instant {
         let (mut due, mut links) = (Instant::NEVER, self.first_rpdos);
         while let Some(rpdo) = self.rpdos.get_mut(links.next(Chain::Valid)) {
@@ -134,7 +134,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         due
     }
 
-    /// A PDO that is configured anew, or that is no longer received, has no faults.
+    /// Clears the faults of a PDO that is reconfigured.
     pub(super) fn forget_rpdo_faults(&mut self, place: u16, now: Instant) {
         for kind in [RpdoFault::TooShort, RpdoFault::TooLong, RpdoFault::Deadline] {
             self.set_rpdo_fault(place.into(), kind, false, now);
@@ -142,7 +142,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 }
 
-/// The bit of a CAN-ID in the filter: the lowest five bits, which in the pre-defined connection set are of the node-ID.
+/// The bit of a CAN-ID in the filter, from its lowest five bits: in the pre-defined connection set, a part of the
+/// node-ID.
 pub(super) fn filter_bit(id: u16) -> u32 {
     1 << (id & 31)
 }

@@ -1,12 +1,12 @@
-//! Services: the SDO server, the heartbeat and LSS, and when each of them is due.
+//! Services: the SDO server, the heartbeat and LSS, and their deadlines.
 
 use super::body::Body;
-use super::lss::Layer;
+use super::lss::LssSlave;
 use super::{Application as _, Next, Node, STALE};
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::sdo::{Abort, Server};
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
@@ -14,17 +14,18 @@ const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
 
-/// The SDO server and the LSS slave of a device, with the responses that wait for the queue.
+/// The SDO server and the LSS slave of a device, with the responses that wait for room in the queue.
 #[derive(Debug)]
 pub(super) struct Services {
     server: Server,
-    /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is none.
+    /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is not a
+    /// request.
     sdo_request: FullFrameId,
-    /// When to try again to send a reply of the server that found the queue full.
+    /// When to send a reply of the server again that found the queue full.
     reply_due: Instant,
-    /// When to go on with a block that found the queue full.
+    /// When to continue a block that found the queue full.
     block_due: Instant,
-    lss: Layer,
+    lss: LssSlave,
 }
 
 impl Services {
@@ -34,7 +35,7 @@ impl Services {
             sdo_request: sdo_request(node_id),
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
-            lss: Layer::new(node_id),
+            lss: LssSlave::new(node_id),
         }
     }
 
@@ -42,7 +43,7 @@ impl Services {
         self.lss.set_bit_rate(bit_rate);
     }
 
-    /// A reset of the device; the node-ID with which the device starts.
+    /// Resets the services. Returns the node-ID with which the device starts.
     pub(super) fn restart(&mut self) -> Option<NodeId> {
         self.forget_transfer();
         self.lss.restart();
@@ -55,13 +56,14 @@ impl Services {
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
     }
 
-    /// One call. The way to the queue is shut while the bit rate changes.
-    pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
-        Turn { now, out, is_open: !self.lss.is_switching() }
+    /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
+    /// nothing.
+    pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
+        Context { now, out, is_open: !self.lss.is_switching() }
     }
 }
 
-/// The CAN-ID of requests to the SDO server; that of no device without a node-ID.
+/// The CAN-ID of requests to the SDO server. Without a node-ID, the CAN-ID for node-ID 0, which no client uses.
 fn sdo_request(node_id: Option<NodeId>) -> FullFrameId {
     CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get)).into()
 }
@@ -77,7 +79,7 @@ impl<B: Body> Node<B> {
         self.services_next()
     }
 
-    /// Sends what is due of the services, and hands over what is left to the caller.
+    /// Sends the frames of the services that are due, and returns a waiting action.
     #[inline]
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().services_due {
@@ -92,7 +94,8 @@ impl<B: Body> Node<B> {
         [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
     }
 
-    /// Takes a frame if it is a segment of a block from which nothing follows. Without SDO, no transfer is under way.
+    /// Takes a frame if it is a block segment that needs no further processing. Called in any state: without SDO, there
+    /// is no transfer.
     #[inline]
     fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
         let request = frame.full(self.services.sdo_request);
@@ -103,11 +106,11 @@ impl<B: Body> Node<B> {
     pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         if let Some(request) = frame.full(self.services.sdo_request) {
             if self.body.basic().state.has_services() {
-                self.on_request(request, &mut self.services.turn(now, out));
+                self.on_request(request, &mut self.services.context(now, out));
             }
         } else if frame.id() == lss::REQUEST.get() {
-            let turn = &mut self.services.turn(now, out);
-            self.services.lss.take_frame(frame, turn, &mut self.body);
+            let context = &mut self.services.context(now, out);
+            self.services.lss.take_frame(frame, context, &mut self.body);
         } else if frame.id() & 0x780 == ERROR_CONTROL {
             self.body.on_heartbeat(frame, now);
         }
@@ -117,69 +120,69 @@ impl<B: Body> Node<B> {
     }
 
     #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn on_request(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>) {
+    fn on_request(&mut self, request: &[u8; 8], context: &mut Context<'_, impl Transmit>) {
         let Services { server, reply_due, .. } = &mut self.services;
-        let has_reply = server.answer(request, &mut self.body, turn.now);
+        let has_reply = server.answer(request, &mut self.body, context.now);
         if !server.is_idle() {
             self.body.basic_mut().serve_until(server.deadline());
         }
-        // Only a request without a reply starts a block.
+        // Only a request without a reply can start a block.
         if has_reply {
-            return self.respond(turn);
+            return self.respond(context);
         }
-        // A reply that still waits is obsolete: its client has gone on.
+        // A reply that still waits is obsolete: the client has sent its next request.
         *reply_due = Instant::NEVER;
         if B::Application::BLOCK_UPLOAD && server.is_sending() {
-            self.send_block(turn);
+            self.send_block(context);
         }
     }
 
-    /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
+    /// Sends segments of a block upload while the queue has plenty of room: a transfer must not delay PDOs.
     #[inline(never)]
-    fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+    fn send_block(&mut self, context: &mut Context<'_, impl Transmit>) {
         let id = self.body.basic().service(SDO_RESPONSE);
         let server = &mut self.services.server;
-        let has_reply = server.send_block(&self.body, turn.now, |data| {
-            turn.room() > B::RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
+        let has_reply = server.send_block(&self.body, context.now, |data| {
+            context.room() > B::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
-        let block_due = if server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
+        let block_due = if server.is_sending() { context.now + RETRY } else { Instant::NEVER };
         self.services.block_due = block_due;
         self.body.basic_mut().serve_until(block_due);
         if has_reply {
-            self.respond(turn);
+            self.respond(context);
         }
     }
 
     /// Sends the server's reply.
     #[inline(never)]
-    fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+    fn respond(&mut self, context: &mut Context<'_, impl Transmit>) {
         let basic = self.body.basic_mut();
         let id = basic.service(SDO_RESPONSE);
-        if turn.send(Frame::data_frame(id, 8, self.services.server.reply())) {
+        if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
             self.services.reply_due = Instant::NEVER;
         } else {
-            self.services.reply_due = turn.now + RETRY;
+            self.services.reply_due = context.now + RETRY;
             basic.serve_until(self.services.reply_due);
         }
     }
 
-    /// A job has come to its end: whoever waits for the end is answered, the LSS master if `lss_waits`.
+    /// A job is finished: answers the SDO client that waits for it, and the LSS master if `lss_waits`.
     pub(super) fn finish_job(
         &mut self,
         result: Result<(), Abort>,
         lss_waits: bool,
-        turn: &mut Turn<'_, impl Transmit>,
+        context: &mut Context<'_, impl Transmit>,
     ) {
         if lss_waits {
-            self.services.lss.respond(lss::Slave::stored(result.is_ok()), turn);
+            self.services.lss.respond(lss::Slave::stored(result.is_ok()), context);
         }
-        if self.services.server.release(result, turn.now) {
-            self.respond(turn);
+        if self.services.server.release(result, context.now) {
+            self.respond(context);
         }
         self.body.basic_mut().services_due = STALE;
     }
 
-    /// A transfer does not survive a state without SDO.
+    /// Forgets the transfer in a state without SDO.
     pub(super) fn silence_services(&mut self) {
         if !self.body.basic().state.has_services() {
             self.services.forget_transfer();
@@ -189,27 +192,27 @@ impl<B: Body> Node<B> {
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
         self.services.lss.poll_switching(now, &mut self.body);
-        let turn = &mut self.services.turn(now, out);
-        self.services.lss.poll(turn);
+        let context = &mut self.services.context(now, out);
+        self.services.lss.poll(context);
         let basic = self.body.basic_mut();
         if !basic.is_initialising() {
             let id = basic.service(ERROR_CONTROL);
-            basic.heartbeat.poll(id, basic.state, turn);
-            self.body.poll_errors(turn);
+            basic.heartbeat.poll(id, basic.state, context);
+            self.body.poll_errors(context);
             self.silence_services();
         }
         if self.body.basic().state.has_services() {
-            self.poll_sdo(turn);
+            self.poll_sdo(context);
         }
         self.body.basic_mut().services_due = self.next_service();
     }
 
-    fn poll_sdo(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.services.reply_due || self.services.server.expire(turn.now) {
-            self.respond(turn);
+    fn poll_sdo(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now >= self.services.reply_due || self.services.server.expire(context.now) {
+            self.respond(context);
         }
-        if B::Application::BLOCK_UPLOAD && turn.now >= self.services.block_due {
-            self.send_block(turn);
+        if B::Application::BLOCK_UPLOAD && context.now >= self.services.block_due {
+            self.send_block(context);
         }
     }
 
@@ -220,7 +223,7 @@ impl<B: Body> Node<B> {
             return lss;
         }
         let due = lss.min(basic.heartbeat.due()).min(self.body.errors_due());
-        // Without SDO, no transfer is under way, and nothing of the three is due.
+        // In a state without SDO there is no transfer, and none of these three deadlines is set.
         due.min(services.server.deadline()).min(services.reply_due).min(services.block_due)
     }
 }

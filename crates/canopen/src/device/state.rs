@@ -1,4 +1,4 @@
-//! NMT state and resets, and what waits for the caller.
+//! NMT state and resets, and the actions that wait for the caller.
 
 use super::basic::Basic;
 use super::body::Body;
@@ -6,10 +6,10 @@ use super::pdos::low_half;
 use super::{Action, Application, Device, Job, Next, Node, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{Instant, Transmit};
 
-/// 1F80h: the one value that makes the node start by itself.
+/// 1F80h: the only supported value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
 
 /// The part of the device that [`Node::start`] initialises.
@@ -40,20 +40,21 @@ impl Scope {
 
 /// Actions that wait for the caller.
 #[derive(Debug)]
-#[allow(clippy::struct_excessive_bools)] // Each waits for its own.
+#[allow(clippy::struct_excessive_bools)] // Independent flags.
 pub(super) struct Pending {
     /// An action waits to be handed over.
     is_waiting: bool,
-    /// Covered by the next start; the caller is told once (`reset_untold`).
+    /// The scope of the next start. The caller is told once (`reset_is_new`).
     reset: Reset,
-    reset_untold: bool,
+    reset_is_new: bool,
     identifiers: bool,
     parameters: bool,
-    /// The state to which the first values lead, where 1F80h asks for it: no PDO carries what nobody has measured.
-    pub(super) with_values: Option<State>,
-    /// Of LSS or of program control.
+    /// The NMT state to enter with the first values, if 1F80h asks for it: before, PDOs would carry values nobody has
+    /// measured.
+    pub(super) self_start_state: Option<State>,
+    /// A request of LSS or of program control.
     request: Option<Action>,
-    /// To be stored or restored.
+    /// A job to store or restore values.
     job: Option<Job>,
 }
 
@@ -62,35 +63,35 @@ impl Pending {
         Pending {
             is_waiting: false,
             reset: Reset::Node,
-            reset_untold: false,
+            reset_is_new: false,
             identifiers: false,
             parameters: false,
-            with_values: None,
+            self_start_state: None,
             request: None,
             job: None,
         }
     }
 
-    /// The values have been loaded: everything may have changed. A job that has begun goes on.
-    fn begin_anew(&mut self) {
+    /// The values have been loaded, so all identifiers and parameters may have changed. A job under way continues.
+    fn values_loaded(&mut self) {
         let job = self.job.take();
         *self = Pending { identifiers: true, parameters: true, is_waiting: true, job, ..Pending::new() };
     }
 
     fn has_action(&self) -> bool {
-        self.reset_untold || self.identifiers || self.request.is_some() || self.job.is_some()
+        self.reset_is_new || self.identifiers || self.request.is_some() || self.job.is_some()
     }
 
     fn reset(&mut self, reset: Reset) {
-        (self.reset, self.reset_untold, self.is_waiting) = (reset, true, true);
+        (self.reset, self.reset_is_new, self.is_waiting) = (reset, true, true);
     }
 
-    /// Asks the caller for something.
+    /// Asks the caller for an action.
     pub(super) fn ask(&mut self, action: Action) {
         (self.request, self.is_waiting) = (Some(action), true);
     }
 
-    /// Asks the caller to store or restore something.
+    /// Asks the caller to store or restore values.
     pub(super) fn ask_for(&mut self, job: Job) {
         (self.job, self.is_waiting) = (Some(job), true);
     }
@@ -103,9 +104,9 @@ impl Pending {
         self.parameters = true;
     }
 
-    /// The next thing that is left to the caller.
+    /// The next action for the caller.
     fn take_action(&mut self) -> Option<Action> {
-        if core::mem::take(&mut self.reset_untold) {
+        if core::mem::take(&mut self.reset_is_new) {
             return Some(match self.reset {
                 Reset::Node => Action::ResetNode,
                 Reset::Communication => Action::ResetCommunication,
@@ -122,9 +123,9 @@ impl Pending {
 }
 
 impl<B: Body> Node<B> {
-    /// Initialises what the last reset covers (at first everything) and boots up; if 1F80h says so, a [`Device`] starts by
-    /// itself with the next [`publish`](Device::publish). A node-ID that LSS has configured is taken now; without one, the
-    /// device waits for LSS.
+    /// Initialises the scope of the last reset (the first time, everything) and boots up. If 1F80h asks for it, a
+    /// [`Device`] starts by itself with the next [`publish`](Device::publish). A node-ID that LSS has configured is
+    /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let node_id = self.services.restart();
         self.body.enter(State::Initialising);
@@ -139,20 +140,21 @@ impl<B: Body> Node<B> {
         self.poll_services(now, out)
     }
 
-    /// Takes the values that [`start`](Node::start) will begin with: for parameters that are needed before there is a bus.
-    // Called from two places, and much code.
+    /// Loads the values with which [`start`](Node::start) will begin, for parameters that are needed before the bus
+    /// runs.
+    // Not inlined: two callers, and much code.
     #[inline(never)]
     pub fn load(&mut self) {
         let everything = self.body.basic().pending.reset == Reset::Node;
         self.body.load_values(everything);
         let basic = self.body.basic_mut();
         basic.application.initialise(&mut basic.image);
-        basic.pending.begin_anew();
+        basic.pending.values_loaded();
     }
 
     pub(super) fn command(&mut self, command: Command) {
         let pending = &mut self.body.basic_mut().pending;
-        pending.with_values = None;
+        pending.self_start_state = None;
         let state = match command {
             Command::Start => State::Operational,
             Command::Stop => State::Stopped,
@@ -170,14 +172,14 @@ impl<B: Body> Node<B> {
         self.silence_services();
     }
 
-    /// Result of a call of the process half: deadlines only.
+    /// Result of a call for process data: deadlines only.
     #[inline]
     pub(super) fn process_next(&self) -> Next {
         let Basic { process_due, services_due, .. } = *self.body.basic();
         Next { process: process_due, services: services_due, action: None, parameters: false }
     }
 
-    /// Result of a call of the services half, with one action that waits.
+    /// Result of a call for services, with one waiting action.
     #[inline]
     pub(super) fn services_next(&mut self) -> Next {
         let basic = self.body.basic_mut();
@@ -198,8 +200,8 @@ impl<A: Application> Basic<A, [u8]> {
         action
     }
 
-    /// A device that had no node-ID has got one. Whoever calls the device starts it again.
-    pub(super) fn begin_join(&mut self) {
+    /// A device without a node-ID has received one. The caller has to start the device again.
+    pub(super) fn request_boot_up(&mut self) {
         self.pending.reset(Reset::Communication);
     }
 
@@ -218,12 +220,13 @@ impl<A: Application> Basic<A, [u8]> {
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Device<A, N, T, R, W, M>
 {
-    /// There are values now. A device with an error, or one that its master has already told a state, does not start.
-    pub(super) fn start_by_itself(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let Some(state) = self.body.basic.pending.with_values.take() else { return };
+    /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
+    /// does a device that has already received an NMT command: the command has cleared the request.
+    pub(super) fn self_start(&mut self, context: &mut Context<'_, impl Transmit>) {
+        let Some(state) = self.body.basic.pending.self_start_state.take() else { return };
         if self.body.emcy.register() == 0 {
             self.body.enter(state);
-            self.body.send_process(turn);
+            self.body.send_process(context);
         }
     }
 }

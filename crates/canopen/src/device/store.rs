@@ -1,6 +1,7 @@
-//! Storing and restoring: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and loading at the start.
+//! Storing and restoring: objects 1010h, 1011h and 1F51h, settings, the LSS configuration, and loading at the start.
 //!
-//! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
+//! The device does not access the memory. It hands a [`Job`] to its caller, and answers the client when the job is
+//! done.
 
 use super::body::Body;
 use super::full::Full;
@@ -16,18 +17,18 @@ use crate::{Instant, Transmit};
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 
-/// Commands of 1F51h (CiA 302-3). The bootloader alone can clear a program.
+/// Commands of 1F51h (CiA 302-3). Only the bootloader can clear a program.
 const STOP_PROGRAM: u32 = 0;
 const START_PROGRAM: u32 = 1;
 const RESET_PROGRAM: u32 = 2;
 
-/// Something to be stored or restored. The job is done when [`Device::finish`] says so.
+/// A job to store or restore values. The caller reports its end by [`Device::finish`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Job {
     /// Store the present values of these groups.
     Store(Groups),
-    /// Restore the defaults of these groups with the next reset: forget what is stored of them.
+    /// Restore the defaults of these groups with the next reset: erase the stored values of the groups.
     Restore(Groups),
     /// Store node-ID and bit rate.
     Configure(Configuration),
@@ -35,10 +36,10 @@ pub enum Job {
     Setting(u8),
 }
 
-/// The stored values of a group, with their soundness.
+/// The stored values of a group, and their condition.
 #[derive(Clone, Copy, Debug)]
 pub struct Stored<'a> {
-    /// The values as [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
+    /// The values in the format of [`Dictionary::pack`](crate::dictionary::Dictionary::pack); empty for the defaults.
     pub packed: &'a [u8],
     /// Whether these are the newest values that were stored.
     pub soundness: Soundness,
@@ -56,11 +57,11 @@ pub enum Soundness {
     Lost,
 }
 
-/// The job under way and who waits for its end.
+/// The job under way, and the clients that wait for its end.
 #[derive(Debug)]
 pub(super) struct Jobs {
     running: Option<Job>,
-    /// The request that has just been served began it or waits for it.
+    /// Whether the SDO request just served has begun the job or waits for it.
     is_deferred: bool,
     lss_waits: bool,
 }
@@ -70,7 +71,7 @@ impl Jobs {
         Jobs { running: None, is_deferred: false, lss_waits: false }
     }
 
-    /// Whether the response to the request just served has to wait.
+    /// Whether the response to the request just served has to wait. Returns `true` once.
     pub(super) fn take_deferred(&mut self) -> bool {
         core::mem::take(&mut self.is_deferred)
     }
@@ -79,11 +80,11 @@ impl Jobs {
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Device<A, N, T, R, W, M>
 {
-    /// The job is done, or cannot be: whoever waits for it is answered.
+    /// Reports the end of the job: `result` goes to the clients that wait for it.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
-        let turn = &mut self.services.turn(now, out);
-        self.finish_job(result, lss_waits, turn);
+        let context = &mut self.services.context(now, out);
+        self.finish_job(result, lss_waits, context);
         self.process_next()
     }
 }
@@ -97,7 +98,8 @@ impl Default for Jobs {
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    /// Hands a job to the caller. A second request for the same job waits for the first; for another one there is no room.
+    /// Hands a job to the caller. A second request for the same job waits for the first. Another job is refused
+    /// meanwhile.
     fn begin(&mut self, job: Job) -> Result<(), Abort> {
         match self.jobs.running {
             Some(running) if running != job => Err(Abort::DeviceState),
@@ -121,27 +123,28 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.begin_deferred(job)
     }
 
-    /// Begins to store the calibration. The calibration cannot be restored: its defaults fit no real transducer.
+    /// Begins to store the calibration. A calibration cannot be restored: no defaults would fit a real transducer.
     pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
         let job = Job::Store(Groups::one(Group::Calibration));
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
     }
 
-    /// Begins to store what LSS has configured; whether that is possible.
+    /// Begins to store a configuration from LSS. `false` when another job is under way.
     pub(super) fn begin_configuration(&mut self, configuration: Configuration) -> bool {
         let is_begun = self.begin(Job::Configure(configuration)).is_ok();
         self.jobs.lss_waits |= is_begun;
         is_begun
     }
 
-    /// Begins a job for whose end the answer to the client waits.
+    /// Begins a job; the response to the client waits for its end.
     pub(super) fn begin_deferred(&mut self, job: Job) -> Result<(), Abort> {
         self.begin(job)?;
         self.jobs.is_deferred = true;
         Ok(())
     }
 
-    /// Stop and reset of the program lead to the bootloader, which is what answers next: nobody else does.
+    /// Stop and reset of the program start the bootloader. The request gets no response; the bootloader answers the
+    /// next one.
     pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
         match value {
             STOP_PROGRAM | RESET_PROGRAM => {
@@ -155,7 +158,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.
+    /// Loads the stored values of a group. If they are damaged or do not fit, the whole group keeps its defaults.
     pub(super) fn load_stored(&mut self, group: Group) {
         let Stored { packed, soundness } = self.basic.application.stored(group);
         let fits = self.basic.dictionary.unpack(group, packed, &mut self.basic.image).is_ok()
@@ -168,7 +171,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.basic.application.loaded(group, fits && soundness == Soundness::Whole);
     }
 
-    /// Says on the bus what could not be loaded.
+    /// Reports groups that could not be loaded, by EMCY.
     pub(super) fn report_stored(&mut self, now: Instant) {
         for group in Group::ALL {
             let (lost, older) = (self.lost.contains(group), self.older.contains(group));

@@ -1,4 +1,4 @@
-//! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and what follows from a SYNC.
+//! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and the reaction to a SYNC.
 
 use super::body::Body;
 use super::full::Full;
@@ -6,7 +6,7 @@ use super::{Application, STALE};
 use crate::emcy::Fault;
 use crate::pdo::Chain;
 use crate::sync::Settings;
-use crate::transmit::Turn;
+use crate::transmit::Context;
 use crate::{Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
@@ -23,12 +23,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.clear(Fault::SyncMissing, now);
     }
 
-    pub(super) fn on_sync(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
-        let Ok(sync) = self.sync.take(frame, turn.now) else {
-            return self.report(Fault::SyncLength, turn.now);
+    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+        let Ok(sync) = self.sync.take(frame, context.now) else {
+            return self.report(Fault::SyncLength, context.now);
         };
         if self.sync.is_back() {
-            self.clear(Fault::SyncMissing, turn.now);
+            self.clear(Fault::SyncMissing, context.now);
         }
         let mut links = self.first_rpdos;
         while let Some(rpdo) = self.rpdos.get_mut(links.next(Chain::Synchronous)) {
@@ -39,14 +39,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         self.basic.application.synchronised(sync.counter, &mut self.basic.image);
-        self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, turn));
-        if self.tells_events {
-            self.send_events_with_sync(turn);
+        self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, context));
+        if self.sends_events {
+            self.send_events_with_sync(context);
         }
         self.basic.process_due = self.basic.process_due.min(self.sync.due());
     }
 
-    /// Looks for a SYNC that is missing, and drops what the synchronous window no longer lets out.
+    /// Detects a missing SYNC, and drops TPDOs that were not sent within the synchronous window.
     pub(super) fn poll_sync(&mut self, now: Instant) {
         if self.sync.expire(now) {
             self.raise(Fault::SyncMissing, now);

@@ -1,4 +1,4 @@
-//! The heartbeats of other nodes: object 1016h and what follows when one is missing.
+//! The heartbeats of other nodes: object 1016h, and the reaction to a missing heartbeat.
 
 use super::Application;
 use super::body::Body;
@@ -32,7 +32,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Bits 24..31 are reserved; a node is watched once.
+    /// Checks a value of 1016h: bits 24..31 are reserved, and a node can be monitored only once.
     pub(super) fn admit_watch(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         if value >> 24 != 0 {
             return Err(Abort::InvalidValue);
@@ -47,7 +47,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         Watch::parse(self.basic().number(CONSUMER_TIME, sub))
     }
 
-    /// A new watch knows of no fault yet.
+    /// Configures the monitoring of a node, and clears its fault.
     pub(super) fn configure_watch(&mut self, sub: u8, now: Instant) {
         let number = sub.saturating_sub(1);
         if self.watches.configure(number.into(), self.watch(sub)) {

@@ -1,12 +1,12 @@
-//! Checks of a table of rows at compile time, on which the code at run time relies. The panics here are compile errors.
+//! Checks of a table of rows at compile time. The code at run time relies on them. A panic here is a compile error.
 #![allow(clippy::indexing_slicing, clippy::panic, reason = "evaluated by the compiler")]
 
 use super::compile::{effective_limits, event_timer};
 use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
 use crate::sdo::BUFFER;
 
-/// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
-/// are others, attributes that fit together.
+/// Checks a table: the rows are sorted, no entry occurs twice, every default has the type of its entry and is within
+/// its limits, every object has sub-index 0, and the attributes of a row fit together.
 ///
 /// # Panics
 /// During compilation, when a row is wrong.

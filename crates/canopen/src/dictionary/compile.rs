@@ -1,10 +1,10 @@
-//! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
+//! Compiles rows to run-time tables. All of this runs during compilation: a panic here is a compile error.
 #![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
-use super::filling::{Filling, attributes, is_same, larger};
+use super::builder::{TableBuilder, attributes, is_same, larger};
 use super::{Access, Dictionary, Object, Tables, Type, check};
 
-/// How many rows the parts of a table have together.
+/// The number of rows in all parts of a table.
 #[must_use]
 pub const fn count(parts: &[&[Object]]) -> usize {
     let (mut total, mut i) = (0, 0);
@@ -15,10 +15,10 @@ pub const fn count(parts: &[&[Object]]) -> usize {
     total
 }
 
-/// Joins the parts of a table. `N` is what [`count`] says.
+/// Joins the parts of a table. `N` is the result of [`count`].
 ///
 /// # Panics
-/// During compilation, when `N` does not fit.
+/// During compilation, when `N` is not the number of rows.
 #[must_use]
 pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
     let mut rows = [Object::new(0, 0, "", Type::Unsigned8, Access::Const); N];
@@ -35,7 +35,7 @@ pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
     rows
 }
 
-/// The run-time dictionary of a table of rows, after its [`check`](crate::dictionary::check).
+/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check) first.
 #[macro_export]
 macro_rules! dictionary {
     ($rows:expr) => {{
@@ -44,12 +44,12 @@ macro_rules! dictionary {
     }};
 }
 
-/// The run-time dictionaries of several tables of rows, as an array. Parts that the dictionaries have in common exist once.
+/// The run-time dictionaries of several tables of rows, as an array. Equal parts of the dictionaries are stored once.
 #[macro_export]
 macro_rules! dictionaries {
     ($all:expr) => {{
         use $crate::dictionary as make;
-        // Whatever is behind `$all` must not have one of these names.
+        // The expression `$all` must not use any of these names.
         const ROWS_OF_ALL: &[&[make::Object]] = &$all;
         #[allow(long_running_const_eval)]
         const ROOM: make::Counts = make::Counts::of(ROWS_OF_ALL);
@@ -65,12 +65,12 @@ macro_rules! dictionaries {
     }};
 }
 
-/// The room that the tables of some dictionaries need.
+/// The sizes of the run-time tables of some dictionaries.
 #[derive(Clone, Copy, Debug)]
 pub struct Counts {
     /// Series of objects.
     pub series: usize,
-    /// Places of entries.
+    /// Entries of all different shapes of objects.
     pub places: usize,
     /// Different attributes.
     pub attributes: usize,
@@ -79,7 +79,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// The room that the dictionaries of these tables of rows need.
+    /// The sizes for the dictionaries of these tables of rows.
     ///
     /// # Panics
     /// During compilation, when a table is wrong: see [`check`](super::check).
@@ -90,20 +90,20 @@ impl Counts {
             check(all[i]);
             i += 1;
         }
-        Filling::of(all).filled
+        TableBuilder::of(all).used
     }
 }
 
-/// The run-time tables of tables of rows. The parameters are what [`Counts`] says, or more.
+/// Compiles the run-time tables of several tables of rows. The parameters are at least the fields of [`Counts`].
 ///
 /// # Panics
-/// During compilation, when they are less.
+/// During compilation, when a parameter is too small.
 #[must_use]
-#[allow(clippy::cast_possible_truncation)] // `MOST` is less than 2^16.
+#[allow(clippy::cast_possible_truncation)] // `MAX` is less than 2^16.
 pub const fn compile<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize>(
     all: &[&[Object]; D],
 ) -> Tables<D, S, P, A, V> {
-    let Filling { series, places, attributes, defaults, .. } = Filling::of(all);
+    let TableBuilder { series, places, attributes, defaults, .. } = TableBuilder::of(all);
     let (mut ends, mut end, mut i) = ([0; D], 0, 0);
     while i < D {
         end += series_count(all[i]);
@@ -124,7 +124,7 @@ const fn beginning<T: Copy, const N: usize>(all: &[T]) -> [T; N] {
 }
 
 impl<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> Tables<D, S, P, A, V> {
-    /// The dictionaries of the tables of rows that these tables were made of.
+    /// One dictionary for each compiled table of rows, in the same order.
     #[must_use]
     pub const fn dictionaries(&'static self) -> [Dictionary; D] {
         let Tables { series, places, attributes, defaults, ends } = self;
@@ -162,7 +162,7 @@ const fn series_count(rows: &[Object]) -> usize {
     total
 }
 
-/// The rows of the object that begins here.
+/// The number of rows of the object that begins at `first`.
 pub(super) const fn object_len(rows: &[Object], first: usize) -> usize {
     let mut end = first + 1;
     while end < rows.len() && rows[end].index == rows[first].index {
@@ -171,7 +171,7 @@ pub(super) const fn object_len(rows: &[Object], first: usize) -> usize {
     end - first
 }
 
-/// The objects of the series that begins here.
+/// The number of objects in the series that begins at `first`.
 pub(super) const fn series_len(rows: &[Object], first: usize) -> usize {
     let len = object_len(rows, first);
     let mut objects = 1;
@@ -181,7 +181,7 @@ pub(super) const fn series_len(rows: &[Object], first: usize) -> usize {
     objects
 }
 
-/// Whether the object after so many of a series is one of it too.
+/// Whether the object after the first `objects` objects of a series belongs to the series too.
 const fn continues(rows: &[Object], first: usize, len: usize, objects: usize) -> bool {
     let start = first + len * objects;
     if start + len > rows.len() || object_len(rows, start) != len {
@@ -208,7 +208,7 @@ pub(super) const fn effective_limits(row: &Object) -> (i64, i64) {
     }
 }
 
-/// Bytes of the image of all values.
+/// Size of the image of all values in bytes.
 #[must_use]
 pub const fn image_size(rows: &[Object]) -> usize {
     let (mut total, mut i) = (0, 0);
@@ -219,18 +219,18 @@ pub const fn image_size(rows: &[Object]) -> usize {
     total
 }
 
-/// How much room a device needs for a table of rows: the parameters of [`Device`](crate::Device).
+/// The room that a device needs for a table of rows: the parameters of [`Device`](crate::Device).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// Bytes of the image of all values.
+    /// Size of the image of all values in bytes.
     pub image: usize,
-    /// TPDOs.
+    /// Number of TPDOs.
     pub tpdos: usize,
-    /// RPDOs.
+    /// Number of RPDOs.
     pub rpdos: usize,
-    /// Heartbeats that can be watched: entries of 1016h.
+    /// Number of heartbeats that can be monitored: entries of 1016h.
     pub watches: usize,
-    /// Objects that a multiplexed TPDO can send: 0 where no TPDO can be one.
+    /// Number of objects that a multiplexed TPDO can send; 0 if no TPDO can be multiplexed.
     pub scanned: usize,
 }
 
@@ -253,7 +253,7 @@ impl Sizes {
         sizes
     }
 
-    /// The room that each of several tables has enough in.
+    /// The room that is enough for each of several tables.
     #[must_use]
     pub const fn of_any(all: &[&[Object]]) -> Sizes {
         let mut sizes = Sizes::of(&[]);
@@ -272,7 +272,7 @@ impl Sizes {
         sizes
     }
 
-    /// Whether a device of the other sizes is large enough.
+    /// Whether a device with `room` is large enough for these sizes.
     #[must_use]
     pub const fn fits(self, room: Sizes) -> bool {
         self.image <= room.image
@@ -283,7 +283,7 @@ impl Sizes {
     }
 }
 
-/// Whether a number of mapped objects can be 254 or 255.
+/// Whether the number of mapped objects can be 254 or 255.
 const fn can_be_multiplexed(count: &Object) -> bool {
     let (_, high) = effective_limits(count);
     match count.default {
@@ -293,8 +293,8 @@ const fn can_be_multiplexed(count: &Object) -> bool {
     }
 }
 
-/// The type of a device with just the room that a table of rows needs. What is behind `room:` is [`Sizes`] instead of rows:
-/// those of a device for several tables, or for one that is not known yet.
+/// The type of a device with exactly the room for a table of rows. After `room:` stands a [`Sizes`] instead of the
+/// rows, for a device that serves several tables, or a table that is not known yet.
 ///
 /// ```
 /// use canopen::dictionary::{Access, Object, Sizes, Type};
@@ -322,7 +322,7 @@ macro_rules! device {
     };
 }
 
-/// The type of a [`ServiceDevice`](crate::ServiceDevice) with just the room that a table of rows needs.
+/// The type of a [`ServiceDevice`](crate::ServiceDevice) with exactly the room for a table of rows.
 ///
 /// ```
 /// use canopen::{NodeId, ServiceDevice, objects};

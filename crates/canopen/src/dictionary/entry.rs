@@ -4,7 +4,7 @@ use super::limits::Limits;
 use super::{Access, Field, Group, Mapping, Rule, Type};
 use crate::sdo::Abort;
 
-/// The attributes of an entry that other entries can share: all but index, sub-index and place in the image.
+/// The attributes of an entry, without index, sub-index and offset in the image. Other entries can share them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attributes {
     pub(crate) limits: Limits,
@@ -13,11 +13,11 @@ pub(crate) struct Attributes {
     pub(crate) mapping: Mapping,
     pub(crate) group: Option<Group>,
     pub(crate) rule: Rule,
-    /// The default value counts from the node-ID.
+    /// The default value is relative to the node-ID.
     pub(crate) node_relative: bool,
 }
 
-/// One entry as the node needs it.
+/// One entry of the dictionary.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     pub(crate) attributes: &'static Attributes,
@@ -39,7 +39,7 @@ impl Entry {
         self.sub
     }
 
-    /// Place of its value in the image.
+    /// Location of the value in the image.
     #[must_use]
     pub const fn field(&self) -> Field {
         self.field
@@ -49,14 +49,14 @@ impl Entry {
         self.attributes.rule
     }
 
-    /// Whether any value of its size will do: then a PDO is copied to its place without a look.
+    /// Whether every value of the right size is allowed. A PDO writes such a value to the image without a check.
     pub(crate) const fn takes_any(&self) -> bool {
         matches!(self.attributes.rule, Rule::Plain)
             && self.attributes.limits.is_none(self.field.size)
             && !matches!(self.attributes.kind, Type::Real32)
     }
 
-    /// Whether the content is the application's, of any length.
+    /// Whether the application holds the content, of any length.
     pub(crate) const fn is_domain(&self) -> bool {
         matches!(self.attributes.kind, Type::Domain)
     }
@@ -70,7 +70,7 @@ impl Entry {
         self.attributes.access.is_writable()
     }
 
-    /// Checks the length of a value to be written. A string may be shorter than its place.
+    /// Checks the length of a value to be written. Only a string may be shorter than its size in the image.
     pub(crate) fn check_length(&self, len: usize) -> Result<(), Abort> {
         let size = usize::from(self.field.size);
         if len == size {
@@ -83,7 +83,7 @@ impl Entry {
         }
     }
 
-    /// Checks a value of the right length that is to be written, by its first four bytes.
+    /// Checks a value to be written, by its first four bytes. The length must have been checked before.
     #[inline]
     pub(crate) fn check_value(&self, value: u32) -> Result<(), Abort> {
         match self.attributes.kind {
@@ -93,7 +93,7 @@ impl Entry {
     }
 }
 
-/// The number in the first four bytes.
+/// The first four bytes as a number; missing bytes count as 0.
 pub(crate) fn little_endian(bytes: &[u8]) -> u32 {
     if let Some(bytes) = bytes.first_chunk() {
         return u32::from_le_bytes(*bytes);
@@ -101,7 +101,7 @@ pub(crate) fn little_endian(bytes: &[u8]) -> u32 {
     bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
 }
 
-/// A parameter that is not a number would turn every measured value into one that is not.
+/// Refuses infinity and NaN: as a parameter, they would make every measured value invalid.
 fn check_real(value: f32) -> Result<(), Abort> {
     if value.is_finite() { Ok(()) } else { Err(Abort::InvalidValue) }
 }

@@ -1,10 +1,10 @@
-//! The place of one value in the image of all values.
+//! The location of one value in the image of all values.
 
 use crate::sdo::Bytes;
 
-/// Where a value lies in the image, and how long it is.
+/// Offset and size of a value in the image.
 ///
-/// An image shorter than the dictionary says reads as zero and takes no write; nothing here can panic.
+/// Beyond the end of an image that is too short, a value reads as zero and a write has no effect; nothing panics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Field {
     pub(crate) offset: u16,
@@ -19,8 +19,8 @@ impl Field {
         image.get(start..start + usize::from(self.size)).unwrap_or(&[])
     }
 
-    /// Replaces the value, as `set` does, by bytes of which the caller has the first four as a number: a value of four bytes, the
-    /// usual one, needs no call.
+    /// Replaces the value as `set` does. `value` is the first four bytes as a number: a value of four bytes, the most
+    /// frequent size, needs no call of `set`.
     #[inline]
     pub(crate) fn set_number(self, image: &mut [u8], value: u32, bytes: &[u8]) {
         match self.size {
@@ -29,9 +29,9 @@ impl Field {
         }
     }
 
-    /// Replaces the value. Fewer bytes than the value has are followed by zeros, more are cut.
+    /// Replaces the value. If `bytes` is shorter than the value, zeros follow; if it is longer, the rest is ignored.
     pub fn set(self, image: &mut [u8], bytes: &[u8]) {
-        // The usual cases, and the cheap ones.
+        // The frequent sizes. A copy of fixed size is cheap.
         match (self.size, bytes.first_chunk(), bytes.first_chunk()) {
             (4, Some(word), _) => return self.store::<4>(image, *word),
             (8, _, Some(words)) => return self.store::<8>(image, *words),
@@ -46,12 +46,12 @@ impl Field {
         rest.fill(0);
     }
 
-    /// Where the value ends. A place outside every image ends there too.
+    /// The offset after the value. Saturates for a field outside every image.
     pub(crate) fn end(self) -> u16 {
         self.offset.saturating_add(self.size.into())
     }
 
-    /// Eight bytes from the start of the value; those beyond the image are zero.
+    /// Eight bytes from the start of the value; bytes beyond the image are zero.
     pub(crate) fn eight(self, image: &[u8]) -> [u8; 8] {
         let rest = image.get(usize::from(self.offset)..);
         match rest.and_then(<[u8]>::first_chunk) {
@@ -66,7 +66,7 @@ impl Field {
         image.get(usize::from(self.offset)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; K])
     }
 
-    /// Replaces the first `K` bytes from the start of the value: `set` for values whose size the caller knows.
+    /// Replaces the first `K` bytes from the start of the value. Like `set`, for a size that is known at compile time.
     pub fn store<const K: usize>(self, image: &mut [u8], bytes: [u8; K]) {
         if let Some(place) = image.get_mut(usize::from(self.offset)..).and_then(|rest| rest.first_chunk_mut())
         {
@@ -99,7 +99,7 @@ impl Field {
     }
 }
 
-/// The last bytes of an image, then zeros.
+/// The last bytes of an image, followed by zeros.
 #[inline(never)]
 fn padded(rest: &[u8]) -> [u8; 8] {
     Bytes::from_slice(rest).padded()

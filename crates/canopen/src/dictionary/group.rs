@@ -9,7 +9,7 @@ pub enum Group {
     Communication,
     /// Application parameters, sub-index 3.
     Application,
-    /// The calibration: a command of its own stores it, and 1010h and 1011h do not touch it.
+    /// The calibration. It has a store command of its own; 1010h and 1011h do not affect it.
     Calibration,
 }
 
@@ -53,7 +53,7 @@ impl Groups {
         self.0 & 1 << group as u8 != 0
     }
 
-    /// Puts a group in or takes it out.
+    /// Adds a group or removes it.
     pub fn set(&mut self, group: Group, contains: bool) {
         let bit = 1 << group as u8;
         self.0 = if contains { self.0 | bit } else { self.0 & !bit };

@@ -1,24 +1,24 @@
-//! Which values an entry takes.
+//! The range of values that an entry accepts.
 
 use super::Type;
 use crate::sdo::Abort;
 
-/// The limits of an integer of at most 32 bits; anything else takes any value.
+/// The limits of an integer of at most 32 bits. An entry of another type accepts any value.
 ///
-/// A value is within them when, modulo 2^8, 2^16 or 2^32 by its type, it is no further from the lowest than the highest is:
-/// one comparison, with a sign and without.
+/// One comparison checks a value, signed or unsigned: its distance from the lowest value, modulo 2^8, 2^16 or 2^32
+/// depending on the type, must not exceed the distance of the highest value from the lowest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Limits {
-    /// The lowest value, at the top of the word: there a short number wraps as one of its type does.
+    /// The lowest value in the top bits of the word. There, a short number wraps around like a number of its type.
     low: u32,
-    /// From there to the highest, at the top too.
+    /// The distance from the lowest to the highest value, in the top bits too.
     span: u32,
 }
 
 impl Limits {
     const NONE: Limits = Limits { low: 0, span: u32::MAX };
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has seen the ranges.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has verified the ranges.
     pub(super) const fn new(kind: Type, low: i64, high: i64) -> Limits {
         if kind.range().is_none() || kind.size() > 4 {
             return Limits::NONE;
@@ -27,7 +27,7 @@ impl Limits {
         Limits { low, span: high.wrapping_sub(low) }
     }
 
-    /// Whether any value of this size is within them.
+    /// Whether every value of this size is within the limits.
     pub(super) const fn is_none(self, size: u8) -> bool {
         self.span == u32::MAX || self.span == shifted(size, u32::MAX)
     }
@@ -36,7 +36,7 @@ impl Limits {
         self.low == other.low && self.span == other.span
     }
 
-    /// Checks a value of a type of this size, by its first four bytes.
+    /// Checks a value of this type and size, by its first four bytes.
     pub(super) fn check(self, kind: Type, size: u8, value: u32) -> Result<(), Abort> {
         let value = shifted(size, value);
         if value.wrapping_sub(self.low) <= self.span { Ok(()) } else { Err(self.excess(kind, value)) }
@@ -53,7 +53,7 @@ impl Limits {
     }
 }
 
-/// A value of so many bytes at the top of a word. One without limits may have any size.
+/// Moves a value of `size` bytes to the top bits of the word. Without limits, any size is allowed.
 const fn shifted(size: u8, value: u32) -> u32 {
     value.wrapping_shl(0_u32.wrapping_sub(size as u32 * 8))
 }
@@ -62,7 +62,7 @@ const fn shifted(size: u8, value: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Words of values of a type with limits, and what becomes of them.
+    /// Checks each word as a value of this type and compares the result.
     fn assert_checked(kind: Type, (low, high): (i64, i64), words: &[(u32, Result<(), Abort>)]) {
         let limits = Limits::new(kind, low, high);
         for &(word, expected) in words {

@@ -1,17 +1,17 @@
 //! The object dictionary as data.
 //!
-//! A personality writes one const table of [`Object`] rows. From it const functions make what the node needs at run
-//! time, all of it by [`dictionary!`](crate::dictionary!): the [`Tables`], which hold no text but that of default
-//! values. The rows themselves are only referenced by what writes documents on the host, so names and units never
-//! reach the firmware image.
+//! A personality defines one const table of [`Object`] rows. [`dictionary!`](crate::dictionary!) compiles it with const
+//! functions to the run-time [`Tables`], whose only text is the default values of strings. Only the code that writes
+//! documents on the host refers to the rows themselves, so names and units never reach the firmware image.
 //!
-//! All values of a device live in one flat byte image, little endian as on the wire. An entry knows its place.
+//! All values of a device are in one flat byte image, little endian as on the bus. An entry contains the location of
+//! its value.
 
+mod builder;
 mod check;
 mod compile;
 mod entry;
 mod field;
-mod filling;
 mod group;
 mod limits;
 mod object;

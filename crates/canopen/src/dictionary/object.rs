@@ -1,13 +1,13 @@
-//! One row of a dictionary table: everything there is to say about an entry, documentation included.
+//! One row of a dictionary table: all attributes of an entry, including its documentation.
 
 use super::{Group, Rule, Type};
 
 /// Access by SDO (CiA 306).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Never changes.
+    /// The value never changes.
     Const,
-    /// Changes by itself.
+    /// Only the device changes the value.
     ReadOnly,
     /// A command.
     WriteOnly,
@@ -29,7 +29,7 @@ impl Access {
     }
 }
 
-/// Into which PDOs an entry can be mapped.
+/// The PDOs into which an entry can be mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapping {
     /// None.
@@ -56,18 +56,18 @@ impl Mapping {
     }
 }
 
-/// The value after a reset with nothing saved.
+/// The value after a reset if no value is stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DefaultValue {
-    /// Of any integer type.
+    /// The default of an entry of integer type.
     Integer(i64),
-    /// Of REAL32.
+    /// The default of an entry of type REAL32.
     Real(f32),
-    /// Of `VISIBLE_STRING`.
+    /// The default of an entry of type `VISIBLE_STRING`.
     Text(&'static str),
-    /// This plus the node-ID.
+    /// The node-ID plus this number.
     NodeId(u32),
-    /// Of DOMAIN: the application's.
+    /// An entry of type DOMAIN has no default: the application holds its content.
     None,
 }
 
@@ -86,7 +86,7 @@ pub struct Object {
     pub access: Access,
     /// PDO mapping.
     pub mapping: Mapping,
-    /// Smallest and largest value accepted, where narrower than the type.
+    /// Smallest and largest accepted value; `None` for the range of the type.
     pub limits: Option<(i64, i64)>,
     /// Value after a reset.
     pub default: DefaultValue,
@@ -144,14 +144,14 @@ impl Object {
         self
     }
 
-    /// Makes it a parameter that is stored with a group.
+    /// Makes the entry a parameter that is stored with a group.
     #[must_use]
     pub const fn stored(mut self, group: Group) -> Object {
         self.group = Some(group);
         self
     }
 
-    /// Makes it mappable.
+    /// Makes the entry mappable.
     #[must_use]
     pub const fn mappable(mut self, mapping: Mapping) -> Object {
         self.mapping = mapping;
@@ -171,32 +171,32 @@ impl Object {
         self.with(Rule::Application)
     }
 
-    /// Fixes the CAN-ID of a PDO to the default: only the flags of the COB-ID change. A device profile pre-defines such a
-    /// PDO, and may choose a CAN-ID that CiA 301 restricts, as CiA 417 does with 180h.
+    /// Fixes the CAN-ID of a PDO to its default: a write can change the flags of the COB-ID only. A device profile
+    /// pre-defines such a PDO, and may choose a CAN-ID that CiA 301 restricts, as CiA 417 does with 180h.
     ///
     /// # Panics
-    /// During compilation, for an entry that is no COB-ID of a PDO.
+    /// During compilation, for an entry that is not the COB-ID of a PDO.
     #[must_use]
     pub const fn predefined(self) -> Object {
         assert!(matches!(self.rule, Rule::PdoCobId), "only the COB-ID of a PDO is pre-defined");
         self.with(Rule::PdoPredefined)
     }
 
-    /// Makes the entry another name of the event timer of a TPDO (1800h + `tpdo`, sub-index 5), as the cyclic timer of
-    /// CiA 406 is. Both names have one place in the image.
+    /// Makes the entry another name of the event timer of a TPDO (1800h + `tpdo`, sub-index 5), such as the cyclic
+    /// timer of CiA 406. Both entries have the same location in the image.
     #[must_use]
     pub const fn event_timer_of(self, tpdo: u8) -> Object {
         self.with(Rule::EventTimerOf(tpdo))
     }
 
-    /// Makes the entry a setting of eight bits that is stored at once: a write is answered when the value is stored
-    /// ([`Job::Setting`](crate::Job::Setting)), and the application then shows the value.
+    /// Makes the entry a setting of eight bits that is stored at once. The response to a write is sent when the value
+    /// is stored ([`Job::Setting`](crate::Job::Setting)); then the application changes the value in the image.
     #[must_use]
     pub const fn setting(self) -> Object {
         self.with(Rule::Setting)
     }
 
-    /// Makes the entry the command that stores the calibration, as 1010h stores the other groups.
+    /// Makes the entry the command that stores the calibration, as 1010h does for the other groups.
     #[must_use]
     pub const fn stores_calibration(self) -> Object {
         self.with(Rule::StoreCalibration)
@@ -207,13 +207,13 @@ impl Object {
         self
     }
 
-    /// Index and sub-index as one number, in the order of the table.
+    /// Index and sub-index as one number. Rows are sorted by this number.
     #[must_use]
     pub const fn key(&self) -> u32 {
         (self.index as u32) << 8 | self.sub as u32
     }
 
-    /// Bytes it takes in the image.
+    /// Size of the value in the image in bytes.
     pub(crate) const fn stored_size(&self) -> usize {
         if self.rule.has_place() { self.kind.size() as usize } else { 0 }
     }

@@ -1,16 +1,16 @@
-//! The values of a storage group as one string of bytes that says itself what it holds.
+//! The values of a storage group as a sequence of bytes that describes its own content.
 //!
 //! ```text
-//! run                                      the values of sub-indexes that follow each other and have one size
+//! run                                      values of consecutive sub-indexes of the same size
 //! ┌─────────┬─────┬───────┬──────┬───────────┐
 //! │ index   │ sub │ count │ size │ values    │
 //! │ 2 bytes │ 1   │ 1     │ 1    │ count × size
 //! └─────────┴─────┴───────┴──────┴───────────┘
 //! ```
 //!
-//! As every value carries its index, a set that an older firmware has stored fits a newer dictionary: objects that came
-//! later keep their defaults. A set that names an object which is gone, has another size or no longer takes the value
-//! is refused as a whole.
+//! Every value has its index, so a set that an older firmware has stored fits a newer dictionary: new objects keep
+//! their defaults. A set is refused as a whole if one of its objects no longer exists, has another size or does not
+//! accept the value.
 
 use super::entry::little_endian;
 use super::{DefaultValue, Dictionary, Entry, Group, Object};
@@ -18,7 +18,7 @@ use crate::NodeId;
 use crate::copy::copy;
 use crate::sdo::Abort;
 
-/// Bytes before the values of a run.
+/// Size of the head of a run in bytes.
 const HEAD: usize = 5;
 
 /// The buffer had no room for all values.
@@ -33,7 +33,7 @@ impl core::fmt::Display for BufferFull {
 
 impl core::error::Error for BufferFull {}
 
-/// The most bytes that the group of a table takes when packed.
+/// The maximum size of the packed group of a table, in bytes.
 #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 #[must_use]
 pub const fn packed_size(rows: &[Object], group: Group) -> usize {
@@ -59,11 +59,11 @@ const fn is_next(a: &Object, b: &Object) -> bool {
 }
 
 impl Dictionary {
-    /// Writes the values of a group to the beginning of `out`; how many bytes that takes. A COB-ID that is still the default of
-    /// this node-ID is left out: it goes on following the node-ID.
+    /// Writes the values of a group to the beginning of `out`. Returns the number of bytes. A COB-ID that is equal to
+    /// the default for this node-ID is left out, so that it still follows the node-ID.
     ///
     /// # Errors
-    /// `BufferFull`; what is in `out` then is of no use.
+    /// `BufferFull`; the content of `out` is then useless.
     pub fn pack(
         &self,
         group: Group,
@@ -81,7 +81,8 @@ impl Dictionary {
                 Some((_, head)) => head,
                 None => writer.begin(&entry)?,
             };
-            // The count is the fourth byte of the head; a run has at most as many values as there are sub-indexes.
+            // The count is the fourth byte of the head. A run has at most one value for each sub-index, so the count
+            // does not wrap.
             if let Some(count) = writer.out.get_mut(head + 3) {
                 *count = count.wrapping_add(1);
             }
@@ -91,10 +92,11 @@ impl Dictionary {
         Ok(writer.len)
     }
 
-    /// Takes the values of a packed group into the image.
+    /// Writes the values of a packed group to the image.
     ///
     /// # Errors
-    /// Why the set does not fit this dictionary; the image then holds a part of it and is to be loaded anew.
+    /// The reason why the set does not fit this dictionary. The image then contains a part of the set and must be
+    /// loaded again.
     pub(crate) fn unpack(&self, group: Group, mut packed: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         while !packed.is_empty() {
             let (run, rest) = Run::parse(packed).ok_or(Abort::General)?;
@@ -136,14 +138,14 @@ impl Entry {
     }
 }
 
-/// The buffer, and how much of it is written.
+/// The buffer, and the number of bytes written.
 struct Writer<'a> {
     out: &'a mut [u8],
     len: usize,
 }
 
 impl Writer<'_> {
-    /// Begins a run of no values yet; returns the place of its head.
+    /// Begins a run without values. Returns the offset of its head.
     fn begin(&mut self, entry: &Entry) -> Result<usize, BufferFull> {
         let at = self.len;
         let [low, high] = entry.index().to_le_bytes();
@@ -171,12 +173,13 @@ impl<'a> Run<'a> {
         let (&[low, high, sub, count, size], rest) = packed.split_first_chunk::<HEAD>()?;
         let size = usize::from(size);
         let (bytes, rest) = rest.split_at_checked(usize::from(count) * size)?;
-        // A run of nothing has no place in a set.
+        // An empty run is invalid.
         (!bytes.is_empty())
             .then_some((Run { index: u16::from_le_bytes([low, high]), sub, size, bytes }, rest))
     }
 
-    /// The values with their sub-indexes. A run that would go beyond sub-index 255 wraps to entries it does not fit.
+    /// The values with their sub-indexes. Beyond sub-index 255, the sub-index wraps to entries that do not fit the
+    /// values.
     fn values(&self) -> impl Iterator<Item = (u8, &'a [u8])> {
         let subs = (0..=u8::MAX).map(|i| self.sub.wrapping_add(i));
         subs.zip(self.bytes.chunks_exact(self.size.max(1)))

@@ -1,14 +1,14 @@
-//! Rules: the behaviour of an entry beyond holding a value.
+//! Rules: the effect of an entry beyond storing a value.
 
-/// The behaviour of an entry beyond holding a value. The rules of CiA 301 follow from index and sub-index, so no row can lack its
-/// rule; the others are set by the builders of [`Object`](super::Object).
+/// The effect of an entry beyond storing a value. The rules of CiA 301 follow from index and sub-index, so no row can
+/// lack its rule. The methods of [`Object`](super::Object) set the other rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// Nothing.
+    /// The entry only stores a value.
     Plain,
     /// 1003h:0, number of errors; writing 0 clears the list.
     ErrorCount,
-    /// 1003h:1 and up, an error of the list.
+    /// 1003h:1 and up, an entry of the error list.
     ErrorEntry,
     /// 1005h, COB-ID of SYNC.
     SyncCobId,
@@ -24,19 +24,19 @@ pub enum Rule {
     EmcyCobId,
     /// 1015h, inhibit time of EMCY.
     EmcyInhibit,
-    /// 1016h:1 and up, a node whose heartbeat is watched.
+    /// 1016h:1 and up, a node whose heartbeat is monitored.
     HeartbeatWatch,
     /// 1017h, heartbeat producer time.
     HeartbeatTime,
     /// 1019h, synchronous counter overflow value.
     SyncOverflow,
-    /// 1F51h:1, program control of a program that runs (CiA 302-3).
+    /// 1F51h:1, program control of the running program (CiA 302-3).
     ProgramControl,
     /// 1F80h, NMT start-up.
     StartUp,
     /// 1400h.., 1800h..:1, COB-ID of a PDO.
     PdoCobId,
-    /// The COB-ID of a PDO to which a profile has given its CAN-ID: only the flags change.
+    /// The COB-ID of a PDO whose CAN-ID a profile defines: only the flags can change.
     PdoPredefined,
     /// 1400h.., 1800h..:2, transmission type.
     PdoType,
@@ -46,7 +46,7 @@ pub enum Rule {
     PdoEventTimer,
     /// 1800h..:6, SYNC start value.
     PdoSyncStart,
-    /// Another name of 1800h..:5, the event timer of this TPDO, from 0.
+    /// Another name of 1800h..:5, the event timer of the TPDO with this number, from 0.
     EventTimerOf(u8),
     /// 1600h.., 1A00h..:0, number of mapped objects.
     PdoCount,
@@ -58,12 +58,12 @@ pub enum Rule {
     StoreCalibration,
     /// A setting that is stored at once.
     Setting,
-    /// The application decides.
+    /// The application decides on each write.
     Application,
 }
 
 impl Rule {
-    /// The rule of an entry of CiA 301 or 302; nothing for any other.
+    /// The rule of an entry of CiA 301 or 302; `Plain` for any other entry.
     pub(super) const fn of(index: u16, sub: u8) -> Rule {
         match (index, sub) {
             (0x1003, 0) => Rule::ErrorCount,
@@ -98,7 +98,7 @@ impl Rule {
         }
     }
 
-    /// Whether a write is a command: the value that is read stays.
+    /// Whether a write is a command that does not change the stored value.
     #[must_use]
     pub const fn is_command(self) -> bool {
         matches!(
@@ -107,7 +107,7 @@ impl Rule {
         )
     }
 
-    /// A number of its own, as constant functions cannot compare rules.
+    /// A unique number: constant functions cannot compare rules.
     pub(super) const fn code(self) -> u16 {
         match self {
             Rule::Plain => 0,
@@ -141,17 +141,17 @@ impl Rule {
         }
     }
 
-    /// Whether the value has a place of its own in the image.
+    /// Whether the entry has its own space in the image.
     pub(crate) const fn has_place(self) -> bool {
         !matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))
     }
 
-    /// Whether the value lives outside the image.
+    /// Whether the value is not in the image but computed when it is read.
     pub(crate) const fn is_computed(self) -> bool {
         matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
     }
 
-    /// The size of the data type that an entry with the rule must have; `None` where any will do.
+    /// The size in bytes that the data type of an entry with this rule must have; `None` for any size.
     pub(super) const fn size(self) -> Option<u8> {
         match self {
             Rule::Plain | Rule::Application => None,

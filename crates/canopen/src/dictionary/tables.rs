@@ -1,4 +1,4 @@
-//! The dictionary at run time: tables without text, found by binary search.
+//! The dictionary at run time: tables without text, searched by binary search.
 //!
 //! ```text
 //! series of objects              places of entries           attributes
@@ -9,9 +9,9 @@
 //!      └─► default values        └───────────────────┘       └────────────────────┘
 //! ```
 //!
-//! Objects that follow each other and differ in nothing but their values, as the parameters of PDOs do, are one series.
-//! Series of one shape share their places, entries of equal attributes share those, and a run of default values that is
-//! found among others is there once; all of that across the dictionaries that are compiled together.
+//! Consecutive objects that differ in nothing but their values, such as the parameters of PDOs, form one series. Series
+//! of the same shape share their places, and entries share equal attributes. A sequence of default values is stored
+//! once. All dictionaries that are compiled together share these tables.
 
 use super::entry::{Attributes, little_endian};
 use super::{Entry, Field};
@@ -20,34 +20,35 @@ use crate::copy::copy;
 use crate::pdo::Direction;
 use crate::sdo::Abort;
 
-/// Objects of one shape with indexes that follow each other.
+/// Consecutive objects of the same shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Series {
     /// Index of the first object.
     pub(crate) index: u16,
-    /// Where the first object begins in the image.
+    /// Offset of the first object in the image.
     pub(crate) offset: u16,
-    /// Number of the first place.
+    /// Number of the first place in the table of places.
     pub(crate) first: u16,
-    /// Number of the first default value, and how many there are: those behind them are 0.
+    /// Number of the first default byte, and how many bytes are stored. All further bytes are 0.
     pub(crate) defaults: u16,
-    pub(crate) given: u16,
+    pub(crate) defaults_len: u16,
     pub(crate) objects: u8,
-    /// Entries of an object.
+    /// Number of entries of an object.
     pub(crate) entries: u8,
 }
 
-/// An entry of an object.
+/// An entry in the shape of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) sub: u8,
-    /// Number of its attributes.
+    /// Number of its attributes in the table of attributes.
     pub(crate) attributes: u8,
-    /// From the start of the object, modulo 2^16: another name of a value has its place, which is before the object.
+    /// Offset from the start of the object, modulo 2^16: for another name of an event timer, the location is before the
+    /// object.
     pub(crate) offset: u16,
 }
 
-/// The output of [`compile`](super::compile) for `D` tables of rows: room for `S` series, `P` places, `A` attributes and `V`
+/// The output of [`compile`](super::compile) for `D` tables of rows: `S` series, `P` places, `A` attributes and `V`
 /// bytes of default values.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> {
@@ -56,7 +57,7 @@ pub struct Tables<const D: usize, const S: usize, const P: usize, const A: usize
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],
     pub(crate) defaults: [u8; V],
-    /// Where the series of each dictionary end.
+    /// The end of the series of each dictionary.
     pub(crate) ends: [u16; D],
 }
 
@@ -70,20 +71,21 @@ pub struct Dictionary {
 }
 
 impl Dictionary {
-    /// All entries, sorted.
+    /// All entries, sorted by index and sub-index.
     #[must_use]
     pub fn entries(&self) -> Entries {
         Entries { dictionary: *self, series: 0, object: 0, place: 0 }
     }
 
-    /// Bytes of the image of all values.
+    /// Size of the image of all values in bytes.
     #[must_use]
     pub fn image_size(&self) -> usize {
         let stored = self.entries().filter(|entry| !entry.rule().is_computed());
         stored.map(|entry| entry.field.end()).max().map_or(0, usize::from)
     }
 
-    /// Gives all values of an image their defaults; what counts from the node-ID gets the rest.
+    /// Sets all values of an image to their defaults. A default that is relative to the node-ID is set without the
+    /// node-ID.
     pub fn load_defaults(&self, image: &mut [u8]) {
         image.fill(0);
         for series in self.series {
@@ -92,7 +94,7 @@ impl Dictionary {
         }
     }
 
-    /// The default value of an entry, without the zeros at its end.
+    /// The default value of an entry. Zeros at its end may be missing.
     pub(crate) fn default(&self, entry: &Entry) -> &'static [u8] {
         let Ok((series, _)) = self.series_of(entry.index, entry.sub) else { return &[] };
         let start = entry.field.offset.wrapping_sub(series.offset);
@@ -102,11 +104,11 @@ impl Dictionary {
 
     fn defaults_of(&self, series: &Series) -> &'static [u8] {
         let first = usize::from(series.defaults);
-        self.defaults.get(first..first + usize::from(series.given)).unwrap_or_default()
+        self.defaults.get(first..first + usize::from(series.defaults_len)).unwrap_or_default()
     }
 
-    /// The index of the communication object of a PDO: the one at this place among those that the dictionary has one way,
-    /// ascending.
+    /// The index of the communication object of a PDO. `place` is the rank of the PDO among those of the dictionary in
+    /// this direction, by ascending number.
     #[inline(never)]
     pub(crate) fn pdo(&self, direction: Direction, place: u16) -> Option<u16> {
         let first = match direction {
@@ -124,16 +126,16 @@ impl Dictionary {
         None
     }
 
-    /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
+    /// The default value of an integer of at most 32 bits, including the node-ID where the default is relative to it.
     pub(crate) fn default_number(&self, entry: &Entry, node_id: Option<NodeId>) -> u32 {
         let node_id = node_id.filter(|_| entry.attributes.node_relative).map_or(0, NodeId::get);
         little_endian(self.default(entry)).wrapping_add(node_id.into())
     }
 
-    /// The entry of an index and a sub-index.
+    /// The entry with this index and sub-index.
     ///
     /// # Errors
-    /// `NoObject` where the index is unknown, `NoSubIndex` where only the sub-index is.
+    /// `NoObject` for an unknown index, `NoSubIndex` for an unknown sub-index of a known object.
     pub fn find(&self, index: u16, sub: u8) -> Result<Entry, Abort> {
         let (series, number) = self.series_of(index, sub)?;
         // Most objects have the sub-indexes 0, 1, 2 and so on.
@@ -145,10 +147,10 @@ impl Dictionary {
         place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
 
-    /// The series of an entry's object, and the number of the object there.
+    /// The series that contains an object, and the number of the object in the series.
     #[inline]
     fn series_of(&self, index: u16, sub: u8) -> Result<(&'static Series, u16), Abort> {
-        // As `Object::key`: an index alone would be extended to a word in every step.
+        // Computed as in `Object::key`. If only the index were compared, every step would have to extend it to a word.
         let key = u32::from(index) << 8 | u32::from(sub);
         let after = self.series.partition_point(|series| u32::from(series.index) << 8 <= key);
         let series = self.series.get(after.wrapping_sub(1)).ok_or(Abort::NoObject)?;
@@ -161,7 +163,7 @@ impl Dictionary {
         self.places.get(first..first + usize::from(series.entries)).unwrap_or(&[])
     }
 
-    /// The entry at a place in an object of a series.
+    /// The entry at a place of an object of a series.
     #[inline]
     fn entry(&self, series: &Series, number: u16, place: Place) -> Option<Entry> {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
@@ -171,7 +173,7 @@ impl Dictionary {
         Some(Entry { attributes, field, sub: place.sub, index: series.index.wrapping_add(number) })
     }
 
-    /// Bytes of an object in the image.
+    /// Size of an object in the image in bytes.
     const fn stride(&self, series: &Series) -> u16 {
         let end = series.first as usize + series.entries as usize;
         let Some((_, [last, ..])) = self.places.split_at_checked(end.wrapping_sub(1)) else { return 0 };
@@ -181,7 +183,7 @@ impl Dictionary {
         last.offset.wrapping_add(attributes.kind.size() as u16)
     }
 
-    /// The place of a value, known at compile time.
+    /// The location of a value, for use at compile time.
     ///
     /// # Panics
     /// During compilation, when there is no such entry.
@@ -217,7 +219,7 @@ pub struct Entries {
 impl Iterator for Entries {
     type Item = Entry;
 
-    // Called from many places that are in no hurry.
+    // Not inlined: many callers, none of them time-critical.
     #[inline(never)]
     fn next(&mut self) -> Option<Entry> {
         let series = self.dictionary.series.get(self.series)?;

@@ -19,18 +19,18 @@ pub enum Type {
     Unsigned32,
     /// UNSIGNED48
     Unsigned48,
-    /// UNSIGNED64; a default value of at most 63 bits.
+    /// UNSIGNED64; the default value can have at most 63 bits.
     Unsigned64,
     /// REAL32
     Real32,
     /// `VISIBLE_STRING` of at most this many characters.
     VisibleString(u8),
-    /// DOMAIN: data of any length that the application keeps.
+    /// DOMAIN: data of any length that the application holds.
     Domain,
 }
 
 impl Type {
-    /// Bytes that a value takes in the image.
+    /// Size of a value in the image in bytes.
     #[must_use]
     pub const fn size(self) -> u8 {
         match self {
@@ -44,7 +44,7 @@ impl Type {
         }
     }
 
-    /// Index of the type in the dictionary, the `DataType` of an EDS.
+    /// Index of the type in the dictionary (CiA 301), the `DataType` of an EDS.
     #[must_use]
     pub const fn code(self) -> u16 {
         match self {
@@ -63,7 +63,7 @@ impl Type {
         }
     }
 
-    /// Smallest and largest value of an integer type; `None` for the others.
+    /// Smallest and largest value of an integer type; `None` for other types.
     #[must_use]
     pub const fn range(self) -> Option<(i64, i64)> {
         match self {

@@ -1,4 +1,4 @@
-//! Faults: those of communication, which the device finds itself, and those of the application.
+//! Faults: communication faults, which the device detects itself, and faults of the application.
 
 use crate::dictionary::Group;
 
@@ -10,63 +10,63 @@ pub enum Fault {
     Overrun,
     /// The CAN controller is error passive (8120h).
     ErrorPassive,
-    /// The CAN controller was off the bus and is back (8140h).
+    /// The CAN controller was bus-off and has recovered (8140h).
     BusOffRecovered,
-    /// SYNC does not come in its period (8100h).
+    /// SYNC has not arrived within its period (8100h).
     SyncMissing,
-    /// A SYNC had another length than 1019h asks for (8240h).
+    /// A SYNC had another length than 1019h requires (8240h).
     SyncLength,
-    /// A multiplexed PDO for this node names an object that takes none (8230h).
+    /// A multiplexed PDO for this node names an object that does not accept it (8230h).
     MpdoNotTaken,
-    /// The heartbeat of a node is missing (8130h): entry of 1016h, from 0.
+    /// The heartbeat of a node is missing (8130h). The number is the entry of 1016h, from 0.
     Heartbeat(u8),
-    /// An RPDO, counted from 0 among those of the dictionary, was shorter than its mapping and is not processed (8210h).
+    /// An RPDO was shorter than its mapping and is not processed (8210h). The number is the rank of the RPDO among
+    /// those of the dictionary, from 0.
     RpdoTooShort(u16),
-    /// An RPDO, counted the same way, was longer than its mapping (8220h).
+    /// An RPDO, numbered the same way, was longer than its mapping (8220h).
     RpdoTooLong(u16),
-    /// An RPDO, counted the same way, did not come in time (8250h).
+    /// An RPDO, numbered the same way, has not arrived in time (8250h).
     RpdoDeadline(u16),
-    /// The stored values of a group could not be loaded, and the defaults hold (6302h, 6303h; 6300h for the calibration;
-    /// the first byte of the error field is 2).
+    /// The stored values of a group could not be loaded, so the defaults are in use (6302h communication, 6303h
+    /// application, 6300h calibration; the first byte of the error field is 2).
     StoredData(Group),
-    /// The newest stored values of a group could not be loaded, and the values of the save before hold (the same codes; the
-    /// first byte of the error field is 1).
+    /// The newest stored values of a group could not be loaded, so the values of the save before are in use (the same
+    /// codes; the first byte of the error field is 1).
     OlderData(Group),
-    /// A condition of the application, by its place in
-    /// [`Application::CONDITIONS`](crate::Application::CONDITIONS).
+    /// A condition of the application, by its position in [`Application::CONDITIONS`](crate::Application::CONDITIONS).
     Application(u8),
 }
 
-/// A fault of the application as EMCY and error register show it.
+/// A fault of the application: its codes in EMCY and error register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Condition {
     /// Emergency error code (CiA 301, table 26, and the device profile).
     pub code: u16,
-    /// Bits of the error register (1001h) that belong to it. Bit 0, the generic error, is always set.
+    /// Bits of the error register (1001h) that the fault sets. Bit 0, the generic error, is always set.
     pub register: u8,
     /// Manufacturer-specific error field of the EMCY.
     pub detail: [u8; 5],
 }
 
 impl Condition {
-    /// A condition of this error code, with the generic error as its only bit of the error register.
+    /// A condition with this error code. In the error register, the condition sets the generic error only.
     #[must_use]
     pub const fn new(code: u16) -> Condition {
         Condition { code, register: 0, detail: [0; 5] }
     }
 }
 
-/// Error field of an EMCY about stored data: what holds instead of what was stored last.
+/// First byte of the error field of an EMCY about stored data: the values that are in use instead.
 const OLDER_HOLDS: u16 = 1;
 const DEFAULTS_HOLD: u16 = 2;
 
-/// The error register: any fault, and communication.
+/// Bits of the error register: generic error, and communication error.
 const GENERIC: u8 = 1;
 const COMMUNICATION: u8 = 1 << 4;
 
 impl Fault {
-    /// The communication faults that exist once, in the order of their bits, and those of the storage groups.
+    /// The faults that can be active only once, in the order of their bits: communication, then the storage groups.
     const SINGLE: [Fault; 12] = [
         Fault::Overrun,
         Fault::ErrorPassive,
@@ -81,10 +81,10 @@ impl Fault {
         Fault::OlderData(Group::Application),
         Fault::OlderData(Group::Calibration),
     ];
-    /// Bits of the communication faults among them.
+    /// The bits of the communication faults in that list.
     const OF_COMMUNICATION: u16 = 0x3F;
 
-    /// The bit of a fault that exists once; `None` for one of many.
+    /// The bit of a fault that can be active only once; `None` for a fault with a number.
     const fn bit(self) -> Option<u8> {
         match self {
             Fault::Overrun => Some(0),
@@ -99,8 +99,9 @@ impl Fault {
         }
     }
 
-    /// How the fault looks on the bus. Of faults that exist several times the error field says which one it is, from 1,
-    /// in its first two bytes; of stored data the first byte says what holds instead. `conditions` are those of the application.
+    /// The codes of the fault in EMCY and error register. For a heartbeat or an RPDO, the first two bytes of the error
+    /// field are its number, from 1. For stored data, the first byte tells which values are in use. `conditions` are
+    /// the conditions of the application.
     #[must_use]
     pub fn condition(self, conditions: &[Condition]) -> Condition {
         let code = match self {
@@ -128,7 +129,8 @@ impl Fault {
         Condition { code, register, detail: [low, high, 0, 0, 0] }
     }
 
-    /// Which one of those that exist several times, from 1; what holds instead of stored data; 0 for the others.
+    /// The start of the error field: the number of a heartbeat or an RPDO, from 1; for stored data, the values in use;
+    /// 0 for other faults.
     const fn detail(self) -> u16 {
         match self {
             Fault::OlderData(_) => OLDER_HOLDS,
@@ -142,7 +144,7 @@ impl Fault {
     }
 }
 
-/// The faults that are active. Of those that exist several times only the number is kept: whoever finds them knows which
+/// The active faults. Of heartbeats and RPDOs only the number of active faults is kept: their consumers know which
 /// of them are active.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct FaultSet {
@@ -154,7 +156,7 @@ pub(crate) struct FaultSet {
 impl FaultSet {
     pub(crate) const EMPTY: FaultSet = FaultSet { single: 0, application: 0, several: 0 };
 
-    /// Whether the fault is new.
+    /// Adds a fault. Returns whether the fault is new.
     pub(crate) fn insert(&mut self, fault: Fault) -> bool {
         let before = *self;
         match (fault, fault.bit()) {
@@ -165,7 +167,7 @@ impl FaultSet {
         *self != before
     }
 
-    /// Whether the fault was active.
+    /// Removes a fault. Returns whether the fault was active.
     pub(crate) fn remove(&mut self, fault: Fault) -> bool {
         let before = *self;
         match (fault, fault.bit()) {
@@ -180,14 +182,14 @@ impl FaultSet {
         self == FaultSet::EMPTY
     }
 
-    /// The faults that exist once.
+    /// The active faults, without those of heartbeats and RPDOs.
     pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
         let single = (0..).zip(Fault::SINGLE).filter(move |(bit, _)| self.single & 1 << bit != 0);
         let application = (0..32).filter(move |number| self.application & application_bit(*number) != 0);
         single.map(|(_, fault): (u16, Fault)| fault).chain(application.map(Fault::Application))
     }
 
-    /// The error register (1001h).
+    /// The value of the error register (1001h).
     pub(crate) fn register(self, conditions: &[Condition]) -> u8 {
         if self.is_empty() {
             return 0;
@@ -200,7 +202,7 @@ impl FaultSet {
     }
 }
 
-/// The bit of a condition of the application; 0 for one beyond the 32 that there can be.
+/// The bit of a condition of the application; 0 for a number above 31.
 fn application_bit(number: u8) -> u32 {
     1_u32.checked_shl(number.into()).unwrap_or(0)
 }

@@ -1,13 +1,13 @@
 //! The pre-defined error field, object 1003h.
 
-/// How many errors are kept.
+/// The number of errors in the list.
 const DEPTH: u8 = 10;
 
-/// The last errors, each as its four bytes in an upload.
+/// The last errors, each in the four bytes of an SDO upload.
 #[derive(Debug)]
 pub(crate) struct History {
     count: u8,
-    /// Where the newest is; the older ones are before it, and before the first comes the last.
+    /// Position of the newest error in the ring buffer. Older errors precede it.
     newest: u8,
     errors: [[u8; 4]; DEPTH as usize],
 }
@@ -29,12 +29,12 @@ impl History {
         self.count = 0;
     }
 
-    /// Sub-index 0.
+    /// Sub-index 0, the number of errors.
     pub(crate) fn count(&self) -> &u8 {
         &self.count
     }
 
-    /// Sub-index 1 and up; `None` beyond the last error.
+    /// Sub-index 1 and up, the newest error first; `None` beyond the oldest error.
     pub(crate) fn error(&self, sub: u8) -> Option<&[u8; 4]> {
         let age = sub.checked_sub(1).filter(|&age| age < self.count)?;
         self.errors.get(usize::from((self.newest + DEPTH - age) % DEPTH))

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
-    /// Emergency error code; 0 reports that the last fault is gone.
+    /// Emergency error code; 0 when no fault is active any more.
     pub code: u16,
     /// Error register, object 1001h.
     pub register: u8,
@@ -13,14 +13,14 @@ pub struct Message {
 }
 
 impl Message {
-    /// Any eight bytes are a message.
+    /// Decodes a message. Any eight bytes are valid.
     #[must_use]
     pub const fn parse(frame: [u8; 8]) -> Message {
         let [low, high, register, detail @ ..] = frame;
         Message { code: u16::from_le_bytes([low, high]), register, detail }
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     pub const fn encode(self) -> [u8; 8] {
         let ([low, high], detail) = (self.code.to_le_bytes(), self.detail);

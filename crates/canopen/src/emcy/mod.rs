@@ -1,4 +1,4 @@
-//! EMCY: faults, what is sent about them and what is remembered (CiA 301, 7.2.7).
+//! EMCY: faults, emergency messages and the error history (CiA 301, 7.2.7).
 
 mod fault;
 mod history;

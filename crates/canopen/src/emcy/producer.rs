@@ -1,27 +1,27 @@
-//! The EMCY producer: keeps the set of faults, sends what changes.
+//! The EMCY producer: keeps the set of active faults and sends their changes.
 
 use super::history::History;
 use super::{Condition, Fault, FaultSet, Message};
 use crate::sdo::Abort;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
-/// Messages that can wait for the queue or for the inhibit time; what comes on top of that takes the place of
-/// the newest.
+/// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
+/// one.
 const WAITING: usize = 8;
 
-/// The COB-ID of a device without EMCY: bit 31 is set.
+/// The COB-ID (1014h) of a device without EMCY: bit 31 is set.
 pub(crate) const OFF: u32 = 1 << 31;
 
-/// Faults, their history and the messages about them.
+/// The active faults, their history and the waiting messages.
 #[derive(Debug)]
 pub(crate) struct Producer {
     /// Conditions of the application.
     conditions: &'static [Condition],
-    /// The bits of the error register that the device has.
+    /// The bits of the error register that the device supports.
     register_bits: u8,
-    /// 1014h; `None` while bit 31 says that there is no EMCY.
+    /// 1014h; `None` while bit 31 disables EMCY.
     id: Option<CobId>,
     active: FaultSet,
     history: History,
@@ -48,7 +48,7 @@ impl Producer {
         }
     }
 
-    /// Takes the COB-ID of 1014h. Bit 31 set means that EMCY does not exist.
+    /// Takes the COB-ID of 1014h. Bit 31 disables EMCY.
     pub(crate) fn configure(&mut self, value: u32) {
         self.id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
     }
@@ -58,7 +58,7 @@ impl Producer {
         self.inhibit = inhibit;
     }
 
-    /// After a reset: the list is empty, and the faults that are still there are news again.
+    /// After a reset: clears the history, and reports the faults that are still active again.
     pub(crate) fn restart(&mut self, now: Instant) {
         self.history.clear();
         self.waiting.clear();
@@ -69,7 +69,7 @@ impl Producer {
         }
     }
 
-    /// Whether it is a new fault.
+    /// Sets a fault. Returns whether the fault is new.
     pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
@@ -80,7 +80,7 @@ impl Producer {
         is_new
     }
 
-    /// Whether it was active. Code 0000h is sent when the last fault is gone.
+    /// Clears a fault. Returns whether the fault was active. After the last active fault, code 0000h is sent.
     pub(crate) fn clear(&mut self, fault: Fault, now: Instant) -> bool {
         let was_active = self.active.remove(fault);
         if was_active && self.active.is_empty() {
@@ -91,8 +91,8 @@ impl Producer {
 
     fn report(&mut self, code: u16, detail: [u8; 5], now: Instant) {
         let message = Message { code, register: self.register(), detail };
-        // In a full queue this message replaces the newest one: the older ones tell how the trouble began, this one tells the
-        // present state.
+        // In a full queue, the message replaces the newest one. The older messages tell how the trouble began; this
+        // message tells the present state.
         if self.waiting.push_back(message).is_err()
             && let Some(newest) = self.waiting.back_mut()
         {
@@ -120,9 +120,9 @@ impl Producer {
         self.due
     }
 
-    /// Sends what waits. To be called in states that have EMCY only; what waits then waits on.
-    pub(crate) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now < self.due {
+    /// Sends the waiting messages. Must be called only in NMT states with EMCY; in other states, messages keep waiting.
+    pub(crate) fn poll(&mut self, context: &mut Context<'_, impl Transmit>) {
+        if context.now < self.due {
             return;
         }
         let Some(cob_id) = self.id else {
@@ -131,13 +131,13 @@ impl Producer {
             return;
         };
         while let Some(message) = self.waiting.front() {
-            if !turn.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
-                self.due = turn.now + RETRY;
+            if !context.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
+                self.due = context.now + RETRY;
                 return;
             }
             let _ = self.waiting.pop_front();
             if self.inhibit != 0 {
-                self.inhibited_until = turn.now + Duration::from_inhibit(self.inhibit);
+                self.inhibited_until = context.now + Duration::from_inhibit(self.inhibit);
                 self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
                 return;
             }
@@ -146,7 +146,7 @@ impl Producer {
     }
 }
 
-/// Checks a new value of 1014h: its CAN-ID is configurable and changes only while EMCY does not exist (bit 31).
+/// Checks a new value of 1014h: the CAN-ID must be configurable, and can change only while EMCY is disabled (bit 31).
 pub(crate) fn check_cob_id(old: u32, new: u32) -> Result<(), Abort> {
     let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
     let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;

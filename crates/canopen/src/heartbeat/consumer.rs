@@ -1,17 +1,18 @@
-//! The consumer (CiA 301, 7.2.8.2.2.2): watches the heartbeats of other nodes.
+//! The heartbeat consumer (CiA 301, 7.2.8.2.2.2): monitors the heartbeats of other nodes.
 
 use crate::{CanId, Duration, Frame, Instant, NodeId};
 
-/// An entry of 1016h: whose heartbeat must come how often.
+/// An entry of 1016h: a node, and the longest time between two of its heartbeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Watch {
     pub(crate) node: NodeId,
-    /// In ms.
+    /// Consumer heartbeat time in ms.
     period: u16,
 }
 
 impl Watch {
-    /// From bits 0..15 (time in ms) and 16..23 (node-ID). `None` for an entry that is not used: time 0, or no node-ID.
+    /// From the value of 1016h: bits 0..15 are the time in ms, bits 16..23 the node-ID. `None` for an unused entry:
+    /// time 0, or no valid node-ID.
     pub(crate) fn parse(value: u32) -> Option<Watch> {
         let [low, high, node, _] = value.to_le_bytes();
         let period = u16::from_le_bytes([low, high]);
@@ -23,24 +24,24 @@ impl Watch {
     }
 }
 
-/// A change in what the consumer knows about a node, with the number of its entry from 0.
+/// A change in the state of a monitored node. The number is its entry of 1016h, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Change {
-    /// Its heartbeat did not come in time.
+    /// The heartbeat of the node has not arrived in time.
     Lost(u8),
-    /// Its heartbeat is there again.
+    /// The heartbeat of a lost node has arrived again.
     Back(u8),
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     watch: Option<Watch>,
-    /// `NEVER` until the first heartbeat, and while it is lost.
+    /// When the heartbeat is missing. `NEVER` until the first heartbeat, and while the heartbeat is lost.
     due: Instant,
     is_lost: bool,
 }
 
-/// Watches up to `W` nodes. Each is watched from its first heartbeat on.
+/// Monitors up to `W` nodes. The monitoring of a node begins with its first heartbeat.
 #[derive(Debug)]
 pub(crate) struct Consumer<const W: usize> {
     entries: [Entry; W],
@@ -52,18 +53,18 @@ impl<const W: usize> Consumer<W> {
         Consumer { entries: [unused; W] }
     }
 
-    /// Takes an entry of 1016h, from 0. The watch starts afresh; whether its node was lost.
+    /// Sets an entry of 1016h, from 0, and restarts its monitoring. Returns whether the old node of the entry was lost.
     pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) -> bool {
         let fresh = Entry { watch, due: Instant::NEVER, is_lost: false };
         self.entries.get_mut(number).is_some_and(|entry| core::mem::replace(entry, fresh).is_lost)
     }
 
-    /// Identifiers of the heartbeats that it watches.
+    /// CAN-IDs of the monitored heartbeats.
     pub(crate) fn ids(&self) -> impl Iterator<Item = CanId> {
         self.entries.iter().filter_map(|entry| entry.watch.map(Watch::id))
     }
 
-    /// The nodes that it watches, entry by entry.
+    /// The monitored nodes, entry by entry.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = Option<NodeId>> {
         self.entries.iter().map(|entry| entry.watch.map(|watch| watch.node))
     }
@@ -87,7 +88,7 @@ impl<const W: usize> Consumer<W> {
         self.entries.iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
     }
 
-    /// A heartbeat that is missing. To be asked until there is none.
+    /// Reports one missing heartbeat. Must be called until the result is `None`.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
         let (number, entry) = (0..).zip(&mut self.entries).find(|(_, entry)| now >= entry.due)?;
         (entry.due, entry.is_lost) = (Instant::NEVER, true);

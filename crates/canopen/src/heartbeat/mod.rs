@@ -1,4 +1,4 @@
-//! Heartbeat: the node's own, and those of the nodes that it watches.
+//! Heartbeat: producer and consumer.
 
 mod consumer;
 mod producer;

@@ -1,13 +1,13 @@
-//! The producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
+//! The heartbeat producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
 
 use crate::nmt::State;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
-/// Sends boot-up once and then a heartbeat every period (1017h).
+/// Sends one boot-up message, then a heartbeat every period (1017h).
 #[derive(Debug)]
 pub(crate) struct Producer {
-    /// In ms; 0 for no heartbeat.
+    /// Producer heartbeat time in ms; 0 for no heartbeat.
     period: u16,
     due: Instant,
     boot_up: bool,
@@ -18,12 +18,12 @@ impl Producer {
         Producer { period: 0, due: Instant::NEVER, boot_up: false }
     }
 
-    /// Boot-up is due at once; it counts as the first heartbeat.
+    /// Makes the boot-up message due at once. It counts as the first heartbeat.
     pub(crate) fn boot_up(&mut self, period: u16, now: Instant) {
         *self = Producer { period, due: now, boot_up: true };
     }
 
-    /// A new period takes effect at once with a heartbeat; 0 switches the heartbeat off.
+    /// Changes the period, and sends the next heartbeat at once; 0 switches the heartbeat off.
     pub(crate) fn set_period(&mut self, period: u16, now: Instant) {
         self.period = period;
         if !self.boot_up {
@@ -31,28 +31,28 @@ impl Producer {
         }
     }
 
-    /// The next instant at which something is due.
+    /// When the next message is due.
     pub(crate) fn due(&self) -> Instant {
         self.due
     }
 
-    /// Sends what is due.
-    pub(crate) fn poll(&mut self, id: CanId, state: State, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now < self.due {
+    /// Sends the boot-up message or the heartbeat, if it is due.
+    pub(crate) fn poll(&mut self, id: CanId, state: State, context: &mut Context<'_, impl Transmit>) {
+        if context.now < self.due {
             return;
         }
         let message = |state: State| Frame::data_frame(id, 1, [state.code(), 0, 0, 0, 0, 0, 0, 0]);
         let sent = if self.boot_up {
-            turn.send_boot_up(message(State::Initialising))
+            context.send_boot_up(message(State::Initialising))
         } else {
-            turn.send_state(message(state))
+            context.send_state(message(state))
         };
         if !sent {
-            self.due = turn.now + RETRY;
+            self.due = context.now + RETRY;
             return;
         }
         self.boot_up = false;
-        self.due = self.following(turn.now);
+        self.due = self.following(context.now);
     }
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.

@@ -5,7 +5,7 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BitRate(u16);
 
-/// Bit rates in kbit/s by index. Index 5 was 100 kbit/s once and is reserved; the last one is automatic detection.
+/// Bit rates in kbit/s by index. Index 5 (formerly 100 kbit/s) is reserved; the last index is automatic detection.
 const TABLE: [Option<u16>; 10] =
     [Some(1000), Some(800), Some(500), Some(250), Some(125), None, Some(50), Some(20), Some(10), Some(0)];
 
@@ -16,13 +16,13 @@ impl BitRate {
     /// 1 Mbit/s.
     pub const FASTEST: BitRate = BitRate(1000);
 
-    /// The bit rate of an index; `None` for one that is reserved.
+    /// The bit rate of an index; `None` for a reserved index.
     #[must_use]
     pub fn from_index(index: u8) -> Option<BitRate> {
         TABLE.get(usize::from(index)).copied().flatten().map(BitRate)
     }
 
-    /// The bit rate of so many kbit/s, 0 for automatic detection; `None` where CiA 301 knows none.
+    /// The bit rate of `kbit` kbit/s, 0 for automatic detection; `None` if CiA 301 does not define it.
     #[must_use]
     pub fn from_kbit(kbit: u16) -> Option<BitRate> {
         TABLE.contains(&Some(kbit)).then_some(BitRate(kbit))
@@ -34,7 +34,7 @@ impl BitRate {
         self.0
     }
 
-    /// Its index in the table.
+    /// The index in the bit timing table.
     #[must_use]
     pub fn index(self) -> u8 {
         let index = TABLE.iter().position(|&kbit| kbit == Some(self.0));

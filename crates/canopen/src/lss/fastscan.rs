@@ -1,8 +1,8 @@
-//! Fastscan: the master finds the identity of an unconfigured slave bit by bit, all slaves answering with one frame.
+//! Fastscan: the master finds the identity of an unconfigured slave bit by bit. All slaves answer with the same frame.
 
 use super::{Identity, Part, Request};
 
-/// State of a scan: the part of the identity that is compared next.
+/// State of a scan: the number of the part of the identity that is compared next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Fastscan {
     part: u8,
@@ -11,9 +11,9 @@ pub(super) struct Fastscan {
 /// Result of a step of the scan for the slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// The slave does not match, or another part is compared: no answer.
+    /// No answer: the slave does not match, or the master compares another part.
     Silent,
-    /// It may be the one.
+    /// The compared bits match: the slave answers.
     Match,
     /// The whole identity has matched: the slave is selected.
     Found,
@@ -32,7 +32,7 @@ impl Fastscan {
             return Step::Silent;
         }
         self.part = next;
-        // The last part is done when the master has nothing further to compare: it names a part that was before.
+        // The master ends the scan by naming an earlier part as the next one.
         if bit == 0 && next < part { Step::Found } else { Step::Match }
     }
 }

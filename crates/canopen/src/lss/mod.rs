@@ -1,7 +1,7 @@
-//! LSS, layer setting services (CiA 305): node-ID and bit rate of a device that is known by its identity alone.
+//! LSS, layer setting services (CiA 305): set node-ID and bit rate of a device that is known by its identity only.
 //!
-//! The master speaks with CAN-ID 7E5h, all slaves answer with 7E4h; every message has eight bytes. A slave is addressed
-//! by its identity (object 1018h), of which no two may be equal on a bus.
+//! The master sends with CAN-ID 7E5h, all slaves answer with 7E4h; every message has eight bytes. A slave is addressed
+//! by its identity (object 1018h), which must be unique on the bus.
 
 mod bit_rate;
 mod fastscan;
@@ -36,7 +36,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// All parts, in the order in which they are asked for.
+    /// All parts, in the order of the select requests.
     pub const ALL: [Part; 4] = [Part::Vendor, Part::Product, Part::Revision, Part::Serial];
 
     pub(crate) fn numbered(number: u8) -> Option<Part> {
@@ -62,7 +62,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// One of its parts.
+    /// The value of one part.
     #[must_use]
     pub const fn part(&self, part: Part) -> u32 {
         match part {
@@ -79,7 +79,7 @@ const fn word(frame: [u8; 8]) -> u32 {
     u32::from_le_bytes([frame[1], frame[2], frame[3], frame[4]])
 }
 
-/// A frame of a command specifier and a number.
+/// The data of a frame with a command specifier and a number.
 const fn frame_of_word(command: u8, value: u32) -> [u8; 8] {
     let [a, b, c, d] = value.to_le_bytes();
     [command, a, b, c, d, 0, 0, 0]

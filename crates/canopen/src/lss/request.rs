@@ -5,30 +5,30 @@ use super::{Part, frame_of_word, word};
 /// A request of the LSS master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Switch state global (04h): all slaves to configuration, or back to waiting.
+    /// Switch state global (04h): switches all slaves to the configuration state or the waiting state.
     SwitchGlobal {
-        /// To configuration.
+        /// `true` for the configuration state.
         configuration: bool,
     },
-    /// Switch state selective (40h to 43h): one of four messages that name one slave.
+    /// Switch state selective (40h to 43h): one of four messages that together address one slave.
     Select(Part, u32),
-    /// Configure node-ID (11h); 255 takes it away.
+    /// Configure node-ID (11h); 255 for no node-ID.
     NodeId(u8),
-    /// Configure bit timing parameters (13h): a table and an index in it.
+    /// Configure bit timing parameters (13h): a table and an index in the table.
     BitTiming {
-        /// Table selector; 0 is that of CiA 301.
+        /// Table selector; 0 is the table of CiA 301.
         table: u8,
         /// Index in the table.
         index: u8,
     },
     /// Activate bit timing parameters (15h), with the switch delay in ms.
     Activate {
-        /// How long to wait before the switch, and how long after it, in ms.
+        /// Switch delay in ms: the time without transmission before the switch, and again after it.
         delay: u16,
     },
     /// Store configuration (17h).
     Store,
-    /// Identify remote slave (46h to 4Bh): one of six messages that name a range of identities.
+    /// Identify remote slave (46h to 4Bh): one of six messages that together define a range of identities.
     Identify(Bound, u32),
     /// Identify non-configured remote slave (4Ch).
     IdentifyUnconfigured,
@@ -38,9 +38,9 @@ pub enum Request {
         value: u32,
         /// The lowest bit to compare, 0 to 31, or [`Request::CONFIRM`].
         bit: u8,
-        /// Which part of the identity, 0 to 3.
+        /// The part of the identity to compare, 0 to 3.
         part: u8,
-        /// Which part comes next.
+        /// The part to compare next, 0 to 3.
         next: u8,
     },
     /// Inquire identity (5Ah to 5Dh).
@@ -49,7 +49,7 @@ pub enum Request {
     InquireNodeId,
 }
 
-/// A bound of the range in which a slave is looked for.
+/// A bound of the range of identities in an identify request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// The vendor-ID.
@@ -83,10 +83,10 @@ const IDENTIFY: u8 = 0x46;
 const INQUIRE: u8 = 0x5A;
 
 impl Request {
-    /// The bit of a fastscan that asks whether there is any unconfigured slave.
+    /// Value of `bit` in a fastscan request that asks whether there is any unconfigured slave.
     pub const CONFIRM: u8 = 0x80;
 
-    /// `None` for a frame that is no request.
+    /// `None` for a frame that is not a request.
     #[must_use]
     pub fn parse(frame: [u8; 8]) -> Option<Request> {
         let [command, first, second, ..] = frame;
@@ -107,7 +107,7 @@ impl Request {
         })
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     pub const fn encode(self) -> [u8; 8] {
         match self {

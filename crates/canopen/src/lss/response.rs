@@ -5,26 +5,26 @@ use super::{Part, frame_of_word, word};
 /// A response of an LSS slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Response {
-    /// It has been selected (44h).
+    /// The slave has been selected (44h).
     Selected,
     /// Configure node-ID (11h): 0, or 1 for a node-ID out of range.
     NodeId(u8),
-    /// Configure bit timing parameters (13h): 0, or 1 for a bit rate that it does not have.
+    /// Configure bit timing parameters (13h): 0, or 1 for a bit rate that the slave does not support.
     BitTiming(u8),
-    /// Store configuration (17h): 0, 1 not supported, or 2 for a failure of the memory.
+    /// Store configuration (17h): 0, or 1 for not supported, or 2 for a failure of the memory.
     Stored(u8),
-    /// The slave's identity is in the range, or matches the fastscan (4Fh).
+    /// The identity of the slave is in the range, or matches the fastscan request (4Fh).
     Identified,
-    /// It has no node-ID (50h).
+    /// The slave has no node-ID (50h).
     Unconfigured,
-    /// A part of its identity (5Ah to 5Dh).
+    /// A part of the identity of the slave (5Ah to 5Dh).
     Identity(Part, u32),
-    /// Its node-ID (5Eh); 255 when it has none.
+    /// The node-ID of the slave (5Eh); 255 when it has none.
     NodeIdIs(u8),
 }
 
 impl Response {
-    /// `None` for a frame that is no response.
+    /// `None` for a frame that is not a response.
     #[must_use]
     pub fn parse(frame: [u8; 8]) -> Option<Response> {
         let [command, code, ..] = frame;
@@ -41,7 +41,7 @@ impl Response {
         })
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     pub const fn encode(self) -> [u8; 8] {
         let (command, value) = match self {

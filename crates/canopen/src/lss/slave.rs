@@ -1,34 +1,34 @@
-//! The slave: which requests are for this device, and what follows from them.
+//! The LSS slave: selects the requests for this device, and decides on the reaction.
 
 use super::fastscan::{Fastscan, Step};
 use super::{BitRate, Bound, Identity, Part, Request, Response};
 use crate::{Duration, NodeId};
 
-/// Node-ID and bit rate as the next reset communication, the next activation or the next start brings them.
+/// Node-ID and bit rate that take effect later: with the next reset communication, activation or start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
-    /// `None` for a device that waits to be given one.
+    /// `None` for a device that waits for a node-ID.
     pub node_id: Option<NodeId>,
     /// The bit rate.
     pub bit_rate: BitRate,
 }
 
-/// Outcome of a request.
+/// The reaction of the device to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// Nothing: the master hears nothing.
+    /// No response.
     Silence,
     Answer(Response),
-    /// A device without a node-ID has got one: it boots.
-    Join,
+    /// A device without a node-ID has received one: it boots up.
+    BootUp,
     /// The bit rate changes.
     Switch(Switch),
-    /// The configuration is to be stored; the response waits until it is.
+    /// Store the configuration; the response is sent when this is done.
     Store(Configuration),
 }
 
-/// A change of the bit rate: nothing is sent for a delay before it and for a delay after it.
+/// A change of the bit rate. Nothing is sent for `delay` before the change and for `delay` after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Switch {
     pub(crate) bit_rate: BitRate,
@@ -42,10 +42,10 @@ impl Switch {
     }
 }
 
-/// The slave of a device.
+/// The LSS slave of a device.
 #[derive(Debug)]
 pub(crate) struct Slave {
-    /// In the state configuration; waiting otherwise.
+    /// `true` in the configuration state, `false` in the waiting state.
     is_selected: bool,
     pending: Configuration,
     /// How many of the four messages of a selection have matched.
@@ -58,7 +58,7 @@ pub(crate) struct Slave {
 const OK: u8 = 0;
 /// A value out of range, or a service that is not supported.
 const REFUSED: u8 = 1;
-/// The memory has failed.
+/// The non-volatile memory has failed.
 const MEMORY: u8 = 2;
 
 impl Slave {
@@ -71,12 +71,12 @@ impl Slave {
         self.pending
     }
 
-    /// A reset of any kind: back to waiting.
+    /// After a reset of any kind: back to the waiting state.
     pub(crate) fn reset(&mut self) {
         *self = Slave::new(self.pending);
     }
 
-    /// Takes a request. `node_id` is the one in use.
+    /// Takes a request. `node_id` is the node-ID in use.
     pub(crate) fn take(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
         match request {
             Request::SwitchGlobal { configuration } => self.switch(configuration, node_id),
@@ -93,7 +93,7 @@ impl Slave {
         }
     }
 
-    /// Takes a request to the one slave that the master has selected.
+    /// Takes a request to the selected slave.
     fn configure(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
         match request {
             Request::NodeId(id) => Outcome::Answer(Response::NodeId(self.set_node_id(id))),
@@ -110,17 +110,18 @@ impl Slave {
         }
     }
 
-    /// The answer to a store that has come to its end.
+    /// The response after an attempt to store the configuration.
     pub(crate) fn stored(good: bool) -> Response {
         Response::Stored(if good { OK } else { MEMORY })
     }
 
-    /// A device that got its node-ID while it had none uses it from the moment it is left alone.
+    /// Switches the state. A device that has received its first node-ID uses it when the master switches back to
+    /// waiting.
     fn switch(&mut self, configuration: bool, node_id: Option<NodeId>) -> Outcome {
         let is_left = core::mem::replace(&mut self.is_selected, configuration) && !configuration;
         (self.selected, self.identified) = (0, 0);
-        let joins = is_left && node_id.is_none() && self.pending.node_id.is_some();
-        if joins { Outcome::Join } else { Outcome::Silence }
+        let boots_up = is_left && node_id.is_none() && self.pending.node_id.is_some();
+        if boots_up { Outcome::BootUp } else { Outcome::Silence }
     }
 
     fn select(&mut self, part: Part, value: u32, identity: &Identity) -> Outcome {
@@ -154,7 +155,7 @@ impl Slave {
         node_id.is_none() && self.pending.node_id.is_none()
     }
 
-    /// A slave that was found already no longer takes part in the search for the next.
+    /// Whether the slave takes part in a fastscan. A slave that has been found already does not.
     fn is_scanned(&self, node_id: Option<NodeId>) -> bool {
         !self.is_selected && self.is_unconfigured(node_id)
     }
@@ -181,7 +182,7 @@ impl Slave {
     }
 }
 
-/// One more message of a series in which each must come in its turn and match; the first one always begins anew.
+/// Counts the messages of a series. Each must arrive in order and match; the first message always restarts the series.
 fn advance(done: u8, number: u8, matches: bool) -> u8 {
     let is_in_turn = number == 0 || number == done;
     if is_in_turn && matches { number.saturating_add(1) } else { 0 }

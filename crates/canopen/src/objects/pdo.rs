@@ -1,11 +1,11 @@
-//! The rows of PDOs: whole PDOs, and their single rows for a PDO that is not like others.
+//! The rows of PDOs: whole PDOs, and single rows for PDOs with other properties.
 
 use super::{list, parameter};
 use crate::dictionary::{DefaultValue, Object, Type};
 use crate::pdo::MappedObject;
 
-/// The default COB-ID of PDO `number`, from 1: `base` is 180h for a TPDO and 200h for an RPDO. The first four have a place in
-/// the pre-defined connection set (CiA 301, 7.3.5); any other is off.
+/// The default COB-ID of PDO `number`, from 1. `base` is 180h for a TPDO and 200h for an RPDO. The PDOs 1 to 4 have a
+/// CAN-ID in the pre-defined connection set (CiA 301, 7.3.5); any other PDO is switched off.
 #[must_use]
 pub const fn default_id(base: u32, number: u16, is_on: bool) -> DefaultValue {
     let off = if is_on { 0 } else { 1 << 31 };
@@ -45,8 +45,8 @@ pub const fn sync_start(index: u16) -> Object {
     parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
 }
 
-/// The number of mapped objects. No limit in the table: 254 and 255 make it a multiplexed PDO, and the rule knows how
-/// many places there are.
+/// The number of mapped objects. The row has no limit: 254 and 255 make the PDO a multiplexed one, and the rule of the
+/// entry checks the number against the mapping entries.
 #[must_use]
 pub const fn count(index: u16, name: &'static str, used: i64) -> Object {
     parameter(index, 0, name, Type::Unsigned8).value(used)
@@ -58,7 +58,7 @@ pub const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
     parameter(index, sub, "Mapped object", Type::Unsigned32).value(mapped)
 }
 
-/// A mapping parameter with eight places, of which the first hold these objects.
+/// A mapping parameter with eight entries. The first entries map the objects in `mapped`.
 ///
 /// # Panics
 /// During compilation, for more than eight objects.
@@ -93,11 +93,11 @@ pub const fn tpdo_parameter(index: u16, name: &'static str, id: DefaultValue) ->
     ]
 }
 
-/// An RPDO, 1 to 512, taken when it comes: 1400h + `number` - 1 and 1600h + `number` - 1. It writes these objects and has
-/// eight places for them; without objects it is off.
+/// RPDO 1 to 512: 1400h + `number` - 1 and 1600h + `number` - 1. Its data is taken on reception. The RPDO maps
+/// `objects` and has eight mapping entries; without objects it is switched off.
 ///
 /// # Panics
-/// During compilation, for a number that no RPDO has, and for objects that do not fit.
+/// During compilation, for a number outside 1 to 512, and for objects that do not fit.
 #[must_use]
 pub const fn rpdo(number: u16, objects: &[Object]) -> [Object; 13] {
     assert!(number >= 1 && number <= 512, "an RPDO has a number from 1 to 512");
@@ -108,11 +108,11 @@ pub const fn rpdo(number: u16, objects: &[Object]) -> [Object; 13] {
     rows
 }
 
-/// A TPDO, 1 to 512, sent with every change of these objects: 1800h + `number` - 1 and 1A00h + `number` - 1. It has eight
-/// places for objects; without objects it is off.
+/// TPDO 1 to 512: 1800h + `number` - 1 and 1A00h + `number` - 1. It is sent on every change of `objects`. The TPDO has
+/// eight mapping entries; without objects it is switched off.
 ///
 /// # Panics
-/// During compilation, for a number that no TPDO has, and for objects that do not fit.
+/// During compilation, for a number outside 1 to 512, and for objects that do not fit.
 #[must_use]
 pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
     assert!(number >= 1 && number <= 512, "a TPDO has a number from 1 to 512");
@@ -123,7 +123,7 @@ pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
     rows
 }
 
-/// A mapping parameter of objects that can be mapped.
+/// A mapping parameter for `objects`, which must be mappable in this direction.
 const fn mapping_of(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
     assert!(objects.len() <= 8, "a PDO has eight places");
     let (mut i, mut len, mut mapped) = (0, 0, [0; 8]);

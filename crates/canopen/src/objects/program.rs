@@ -1,9 +1,9 @@
-//! The objects of a program that can be replaced (CiA 302-3), for a device with one program.
+//! The objects for the download of a program (CiA 302-3), for a device with one program.
 
 use super::fixed;
 use crate::dictionary::{Access, Object, Type};
 
-/// 1F50h: the domain that takes a new program.
+/// 1F50h, program data: the domain that takes a new program.
 #[must_use]
 pub const fn program_data() -> [Object; 2] {
     [
@@ -12,7 +12,7 @@ pub const fn program_data() -> [Object; 2] {
     ]
 }
 
-/// 1F51h: starts, stops and clears the program, and says whether it runs.
+/// 1F51h, program control: starts, stops and clears the program, and reads whether the program runs.
 #[must_use]
 pub const fn program_control() -> [Object; 2] {
     [
@@ -21,7 +21,7 @@ pub const fn program_control() -> [Object; 2] {
     ]
 }
 
-/// 1F56h, which the application fills in.
+/// 1F56h, program software identification. The application writes its value.
 #[must_use]
 pub const fn program_identification() -> [Object; 2] {
     [
@@ -30,7 +30,7 @@ pub const fn program_identification() -> [Object; 2] {
     ]
 }
 
-/// 1F57h, which the application fills in.
+/// 1F57h, flash status. The application writes its value.
 #[must_use]
 pub const fn flash_status() -> [Object; 2] {
     [Object::highest(0x1F57, 1, "Flash status"), fixed(0x1F57, 1, "Program 1 flash status", Type::Unsigned32)]

@@ -1,16 +1,16 @@
-//! Chains of PDOs: the hot paths visit the PDOs that concern them and no others, be there eight or 512.
+//! Linked lists of PDOs, so that SYNC, reception and polling visit only the PDOs concerned, of up to 512.
 
-/// A chain of PDOs.
+/// A linked list of PDOs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Chain {
-    /// All that are valid.
+    /// All valid PDOs.
     Valid,
-    /// The valid PDOs that the SYNC concerns: RPDOs whose data waits for the SYNC, and TPDOs whose values the SYNC sends or
-    /// samples.
+    /// The valid PDOs that a SYNC affects: RPDOs whose data waits for the SYNC, and TPDOs whose values are sent or
+    /// sampled with the SYNC.
     Synchronous,
 }
 
-/// The places of the PDOs that follow in each chain, or that begin the chains.
+/// The positions of the next PDO in each chain, or of the first PDO of each chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Links {
     valid: u16,
@@ -18,12 +18,12 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// The place after the last of a chain: no PDO is there.
+    /// The position after the last PDO of a chain: no PDO has this position.
     const NOWHERE: u16 = u16::MAX;
     /// The end of both chains.
     pub(crate) const END: Links = Links { valid: Links::NOWHERE, synchronous: Links::NOWHERE };
 
-    /// The place of the next PDO. There is none at the end.
+    /// The position of the next PDO. At the end of the chain, no PDO has this position.
     #[inline]
     pub(crate) fn next(self, chain: Chain) -> usize {
         usize::from(match chain {
@@ -32,7 +32,7 @@ impl Links {
         })
     }
 
-    /// Puts the PDO at a place before all others.
+    /// Puts the PDO at position `place` before the others of the chain.
     pub(crate) fn prepend(&mut self, chain: Chain, place: usize) {
         let place = u16::try_from(place).unwrap_or(Links::NOWHERE);
         match chain {

@@ -1,4 +1,4 @@
-//! PDO mapping: from mapping entries to places in the image, resolved once, when the mapping is enabled.
+//! PDO mapping: mapping entries are resolved to locations in the image once, when the mapping is enabled.
 
 use super::Addressing;
 use crate::dictionary::{Dictionary, Field};
@@ -16,7 +16,7 @@ pub struct MappedObject {
 }
 
 impl MappedObject {
-    /// Any 32 bits are a mapping entry; whether the object exists is another question.
+    /// Decodes a mapping entry. Any 32 bits are valid; the object may not exist.
     #[must_use]
     pub const fn parse(value: u32) -> MappedObject {
         let [bits, sub, low, high] = value.to_le_bytes();
@@ -30,8 +30,8 @@ impl MappedObject {
         u32::from_le_bytes([self.bits, self.sub, low, high])
     }
 
-    /// Bytes of a dummy entry: a data type (0002h to 0007h) as index, for parts of an RPDO that the node skips
-    /// (CiA 301, 7.4.7.1).
+    /// Size of a dummy entry in bytes. Its index is a data type (0002h to 0007h), and the node skips these bytes of an
+    /// RPDO (CiA 301, 7.4.7.1).
     pub(crate) const fn dummy_size(self) -> Option<u8> {
         match (self.index, self.sub) {
             (0x0002 | 0x0005, 0) => Some(1),
@@ -42,26 +42,27 @@ impl MappedObject {
     }
 }
 
-/// Which way the data goes.
+/// The direction of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
     Transmit,
     Receive,
 }
 
-/// A place outside every image: reads as zero, takes no write.
+/// An offset outside every image: a read gives zero, a write has no effect.
 const NOWHERE: u16 = u16::MAX;
 
-/// The place that a mapping entry names, and whether that takes any value.
+/// The location of a mapped object, and whether the object accepts any value without a check.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Located {
     pub(crate) field: Field,
     pub(crate) takes_any: bool,
 }
 
-/// Finds the place that a mapping entry names.
+/// Finds the location of a mapped object.
 ///
-/// `NoObject` where there is none, `NotMappable` where it cannot go into such a PDO or the length is not its own.
+/// `NoObject` if there is no such object; `NotMappable` if the object cannot be mapped in this direction, or if the
+/// length is not the length of the object.
 pub(crate) fn locate(
     dictionary: &Dictionary,
     mapped: MappedObject,
@@ -78,7 +79,7 @@ pub(crate) fn locate(
                 Direction::Transmit => mapping.allows_tpdo(),
                 Direction::Receive => mapping.allows_rpdo(),
             };
-            // A parameter is more than bytes in the image: whoever measures with it has to be told.
+            // A new value of a parameter must be reported to the application, so it does not skip the check.
             let takes_any = entry.takes_any() && !entry.is_parameter();
             (Located { field: entry.field, takes_any }, fits)
         }
@@ -92,18 +93,18 @@ pub(crate) fn locate(
 pub(crate) enum Content {
     /// Mapped objects.
     Objects(Layout),
-    /// One object at a time, which the PDO names.
+    /// A single object, which the frame names.
     Multiplexed(Addressing),
 }
 
-/// The places in the image of what a PDO carries, in the order of its data. Values that lie beside each other, as those
-/// of one object do, are one place.
+/// The locations of the mapped values in the image, in the order of the PDO data. Adjacent values, such as those of one
+/// object, are merged to one location.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
-    /// Bytes of the PDO.
+    /// Length of the PDO in bytes.
     len: u8,
     count: u8,
-    /// A value must be checked before it is taken: its object has limits or a rule.
+    /// Whether received values must be checked, because an object has limits or a rule or is a parameter.
     is_checked: bool,
     places: [Field; 8],
 }
@@ -131,7 +132,7 @@ impl Layout {
         Ok(())
     }
 
-    /// Whether a received value must be checked before it is taken.
+    /// Whether received values must be checked before they are written.
     pub(crate) fn is_checked(&self) -> bool {
         self.is_checked
     }
@@ -140,19 +141,20 @@ impl Layout {
         self.places.get(..usize::from(self.count)).unwrap_or(&self.places)
     }
 
-    /// Whether a value is in the PDO.
+    /// Whether the PDO carries a value.
     pub(crate) fn contains(&self, field: Field) -> bool {
         self.places().iter().any(|place| (place.offset..place.end()).contains(&field.offset))
     }
 
-    /// Bytes of the PDO.
+    /// Length of the PDO in bytes.
     pub(crate) fn len(&self) -> u8 {
         self.len
     }
 
-    /// The PDO's data from the image.
+    /// Reads the data of the PDO from the image.
     pub(crate) fn gather(&self, image: &[u8]) -> [u8; 8] {
-        // Each place is read as eight bytes. What does not belong to it is overwritten by the next, or cut at the end.
+        // Each value is read as eight bytes. The next value overwrites the surplus bytes, or the mask at the end clears
+        // them.
         let data = match self.places() {
             [place] => place.eight(image),
             places => join(places, image),
@@ -164,7 +166,7 @@ impl Layout {
         (u64::from_le_bytes(data) & mask).to_le_bytes()
     }
 
-    /// The PDO's data into the image.
+    /// Writes the data of the PDO to the image.
     pub(crate) fn scatter(&self, data: [u8; 8], image: &mut [u8]) {
         let mut data = u64::from_le_bytes(data);
         for place in self.places() {
@@ -174,7 +176,7 @@ impl Layout {
     }
 }
 
-/// The first eight bytes of the values in a row.
+/// The first eight bytes of the concatenated values.
 #[inline(never)]
 fn join(places: &[Field], image: &[u8]) -> [u8; 8] {
     let (mut data, mut at) = ([0; 16], 0);

@@ -1,14 +1,14 @@
-//! Multiplexed PDOs (CiA 301, 7.2.2.6): a PDO that says itself which object it carries, in at most four bytes.
+//! Multiplexed PDOs (CiA 301, 7.2.2.6): each frame names the object that it carries, of at most four bytes.
 
 use crate::NodeId;
 use crate::sdo::Multiplexer;
 
-/// How a multiplexed PDO addresses, as the number of mapped objects (1600h.., 1A00h..:0) says.
+/// The addressing mode of a multiplexed PDO: a special number of mapped objects (1600h.., 1A00h..:0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Addressing {
-    /// 254, source address mode: the object is one of the sender's.
+    /// 254, source address mode: the frame names an object of the sender.
     Source,
-    /// 255, destination address mode: the object is one of the receiver's.
+    /// 255, destination address mode: the frame names an object of the receiver.
     Destination,
 }
 
@@ -24,23 +24,23 @@ impl Addressing {
     }
 }
 
-/// The node whose object a multiplexed PDO carries.
+/// The node whose object a frame names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// An object of this node, which has sent the PDO.
+    /// An object of the sender, with the node-ID of the sender.
     Source(NodeId),
-    /// An object of this receiver; `None` for all nodes.
+    /// An object of the receiver with this node-ID; `None` for all nodes.
     Destination(Option<NodeId>),
 }
 
 /// The content of a multiplexed PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mpdo {
-    /// The node whose object a multiplexed PDO carries.
+    /// The node whose object the frame names.
     pub address: Address,
     /// The object.
     pub at: Multiplexer,
-    /// Its value; what is shorter than four bytes is followed by zeros.
+    /// The value of the object; zeros follow a value of less than four bytes.
     pub data: [u8; 4],
 }
 
@@ -48,7 +48,7 @@ pub struct Mpdo {
 const DESTINATION: u8 = 0x80;
 
 impl Mpdo {
-    /// `None` for a sender that is no node.
+    /// `None` for a source address that is not a node-ID.
     #[must_use]
     pub fn parse(frame: [u8; 8]) -> Option<Mpdo> {
         let [address, _, _, _, data @ ..] = frame;
@@ -58,7 +58,7 @@ impl Mpdo {
         Some(Mpdo { address, at: Multiplexer::parse(&frame), data })
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     pub fn encode(self) -> [u8; 8] {
         let address = match self.address {

@@ -1,12 +1,12 @@
-//! One RPDO: when its data is taken.
+//! One RPDO: when its data is accepted.
 //!
-//! The types 0 to 240 take it with the next SYNC, the types 254 and 255 at once. With an event timer, it must come
-//! again within that time.
+//! The types 0 to 240 accept the data with the next SYNC, the types 254 and 255 at once. With an event timer, the next
+//! frame must arrive before the timer elapses.
 
 use super::{Addressing, Content, Layout, Links, Transmission};
 use crate::{CanId, Duration, Frame, Instant};
 
-/// Settings of a valid RPDO, from the objects 1400h.. and 1600h...
+/// Settings of a valid RPDO, from the objects 1400h.. and 1600h.. .
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RpdoSettings {
     id: CanId,
@@ -25,7 +25,7 @@ impl RpdoSettings {
         content: Content::Objects(Layout::EMPTY),
     };
 
-    /// `None` for a transmission type that an RPDO cannot have.
+    /// `None` for a transmission type that an RPDO does not support.
     pub(crate) fn new(
         id: CanId,
         transmission: Transmission,
@@ -38,7 +38,7 @@ impl RpdoSettings {
 }
 
 impl RpdoSettings {
-    /// Bytes that it must have.
+    /// The required length of a frame in bytes.
     fn len(&self) -> usize {
         match &self.content {
             Content::Objects(layout) => layout.len().into(),
@@ -47,16 +47,16 @@ impl RpdoSettings {
     }
 }
 
-/// How the length of a frame compares with the mapping.
+/// The result of a reception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reception {
-    /// As mapped.
+    /// The length is as mapped.
     Complete,
-    /// Too short: not taken (EMCY 8210h).
+    /// Too short: the data is not used (EMCY 8210h).
     TooShort,
-    /// Too long: the first bytes are taken (EMCY 8220h).
+    /// Too long: the first bytes are used (EMCY 8220h).
     TooLong,
-    /// Complete, and of this kind: the device finds out where it goes.
+    /// A multiplexed PDO of at least eight bytes: the device finds the object.
     Multiplexed(Addressing),
 }
 
@@ -69,20 +69,20 @@ pub(crate) enum RpdoFault {
     Deadline,
 }
 
-/// An RPDO. One that is not valid is in no chain.
+/// An RPDO. Only valid RPDOs are in the chains.
 #[derive(Debug)]
 pub(crate) struct Rpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
-    /// Index of its communication object.
+    /// Index of the communication parameter.
     pub(crate) index: u16,
     is_valid: bool,
     settings: RpdoSettings,
-    /// Data that waits for SYNC, the newest.
+    /// The newest data that waits for a SYNC.
     waiting: Option<[u8; 8]>,
-    /// When the deadline passes; `NEVER` before the first reception.
+    /// When the next frame is missing; `NEVER` before the first reception.
     due: Instant,
-    /// The faults that it has, a bit for each [`RpdoFault`].
+    /// The active faults, one bit for each [`RpdoFault`].
     faults: u8,
 }
 
@@ -99,40 +99,40 @@ impl Rpdo {
         }
     }
 
-    /// Whether its data waits for the SYNC.
+    /// Whether the data waits for a SYNC.
     pub(crate) fn is_synchronous(&self) -> bool {
         self.settings.is_synchronous
     }
 
-    /// Whether it carries a multiplexed PDO.
+    /// Whether this is a multiplexed RPDO.
     pub(crate) fn is_multiplexed(&self) -> bool {
         matches!(self.settings.content, Content::Multiplexed(_))
     }
 
-    /// Takes new settings and starts afresh.
+    /// Takes new settings and discards the state of the old ones.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
         self.is_valid = settings.is_some();
         self.settings = settings.unwrap_or(RpdoSettings::UNUSED);
         self.stop();
     }
 
-    /// Leaving Operational.
+    /// Discards waiting data and the deadline, when the NMT state changes.
     pub(crate) fn stop(&mut self) {
         (self.waiting, self.due) = (None, Instant::NEVER);
     }
 
-    /// Its CAN-ID, while it is valid.
+    /// The CAN-ID of a valid RPDO.
     pub(crate) fn id(&self) -> Option<CanId> {
         self.is_valid.then_some(self.settings.id)
     }
 
-    /// Whether a frame has the CAN-ID of this RPDO, which is in a chain.
+    /// Whether a frame has the CAN-ID of this RPDO, which must be valid.
     pub(crate) fn is_of(&self, frame: &Frame) -> bool {
         self.settings.id.get() == frame.id()
     }
 
-    /// Takes a data frame of this PDO: how its length compares, and whether the data is valid at once. `late` is true when
-    /// the synchronous window is over: a synchronous PDO is then ignored.
+    /// Takes a data frame of this RPDO. Returns the result of the reception, and whether the data is valid at once.
+    /// `late` is true when the synchronous window is over: a synchronous RPDO is then ignored.
     #[inline]
     pub(crate) fn take(&mut self, frame: &Frame, now: Instant, late: bool) -> (Reception, bool) {
         let settings = &self.settings;
@@ -157,12 +157,12 @@ impl Rpdo {
         }
     }
 
-    /// A SYNC arrived: what waits becomes valid.
+    /// Takes the data that waited for a SYNC: the SYNC has arrived.
     pub(crate) fn take_waiting(&mut self) -> Option<[u8; 8]> {
         self.waiting.take()
     }
 
-    /// Where the data goes.
+    /// The locations of the mapped objects; `None` for a multiplexed RPDO.
     pub(crate) fn layout(&self) -> Option<&Layout> {
         match &self.settings.content {
             Content::Objects(layout) => Some(layout),
@@ -170,24 +170,24 @@ impl Rpdo {
         }
     }
 
-    /// Takes note of a fault; whether that is a change.
+    /// Sets or clears a fault. Returns whether the state of the fault has changed.
     pub(crate) fn set_fault(&mut self, kind: RpdoFault, active: bool) -> bool {
         let (before, bit) = (self.faults, 1 << kind as u8);
         self.faults = if active { before | bit } else { before & !bit };
         self.faults != before
     }
 
-    /// Whether it has any fault.
+    /// Whether any fault is active.
     pub(crate) fn has_faults(&self) -> bool {
         self.faults != 0
     }
 
-    /// The next instant at which a reception is missing.
+    /// When the next frame is missing.
     pub(crate) fn due(&self) -> Instant {
         self.due
     }
 
-    /// Whether the deadline has just passed.
+    /// Whether the deadline has passed. Reported once.
     pub(crate) fn expire(&mut self, now: Instant) -> bool {
         let is_over = now >= self.due;
         if is_over {

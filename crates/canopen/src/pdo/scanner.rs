@@ -1,13 +1,14 @@
-//! The producer of a multiplexed TPDO: it watches objects and sends those that change.
+//! The producer of a multiplexed TPDO: monitors objects and sends their changes.
 //!
-//! In destination address mode these are all objects that can be mapped and that no other TPDO carries, sent to all
-//! nodes; in source address mode those of the object scanner list. With an event timer the timer alone sends, all of
-//! them; without one, each change does. Entering Operational sends all in both cases.
+//! In destination address mode, the objects are all mappable objects that no other TPDO maps, and they are sent to all
+//! nodes. In source address mode, they are the objects of the object scanner list. With an event timer, only the timer
+//! triggers the transmission, always of all objects. Without one, each changed object is sent. Entering Operational
+//! sends all objects in both cases.
 
 use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
 use crate::sdo::Multiplexer;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
@@ -33,22 +34,22 @@ impl ScannerSettings {
     }
 }
 
-/// An object that is watched.
+/// A monitored object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Watched {
     at: Multiplexer,
     field: Field,
     /// The value that was sent last; `None` before the first transmission.
     sent: Option<[u8; 4]>,
-    /// No other TPDO carries it, and its part of the device is there.
-    is_own: bool,
+    /// Whether the object is sent: no other TPDO maps the object, and the application broadcasts it.
+    is_selected: bool,
     /// The value waits to be sent.
     is_pending: bool,
 }
 
 impl Watched {
     pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
-        Watched { at, field, sent: None, is_own: true, is_pending: false }
+        Watched { at, field, sent: None, is_selected: true, is_pending: false }
     }
 
     fn value(&self, image: &[u8]) -> [u8; 4] {
@@ -60,12 +61,12 @@ impl Watched {
     }
 }
 
-/// The producer, with room for `M` objects. Without settings there is none.
+/// The producer of the multiplexed TPDO, with room for `M` objects. Without settings it sends nothing.
 #[derive(Debug)]
 pub(crate) struct Scanner<const M: usize> {
     settings: Option<ScannerSettings>,
     watched: Vec<Watched, M>,
-    /// Some of them are to be sent.
+    /// Whether any object waits to be sent.
     is_pending: bool,
     event_due: Instant,
     inhibited_until: Instant,
@@ -82,43 +83,44 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
-    /// Whether it has these settings already.
+    /// Whether the present settings are equal to these.
     pub(crate) fn has(&self, settings: Option<ScannerSettings>) -> bool {
         self.settings == settings
     }
 
-    /// Takes new settings. It watches nothing then.
+    /// Takes new settings, and removes all monitored objects.
     pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
         self.settings = settings;
         self.watched.clear();
         self.stop();
     }
 
-    /// Watches one more object; what is beyond its room is left out.
+    /// Monitors one more object. Objects beyond the room are ignored.
     pub(crate) fn watch(&mut self, watched: Watched) {
         let _ = self.watched.push(watched);
     }
 
-    /// Watches of its objects those that are to be told; one that is told for the first time is sent.
-    pub(crate) fn choose(&mut self, is_told: impl Fn(Multiplexer) -> bool) {
-        self.watched.iter_mut().for_each(|watched| watched.is_own = is_told(watched.at));
+    /// Selects the objects to send. An object that is selected for the first time is sent.
+    pub(crate) fn select(&mut self, is_broadcast: impl Fn(Multiplexer) -> bool) {
+        self.watched.iter_mut().for_each(|watched| watched.is_selected = is_broadcast(watched.at));
     }
 
-    /// Forgets the sent values of objects that are no longer sent: one that is chosen again later is sent as new.
-    pub(crate) fn forget_others(&mut self) {
-        for watched in self.watched.iter_mut().filter(|watched| !watched.is_own) {
+    /// Forgets the sent values of objects that are not selected, so that they are sent as new if they are selected
+    /// again.
+    pub(crate) fn forget_deselected(&mut self) {
+        for watched in self.watched.iter_mut().filter(|watched| !watched.is_selected) {
             (watched.sent, watched.is_pending) = (None, false);
         }
     }
 
-    /// No longer watches what a TPDO carries.
-    pub(crate) fn leave_out(&mut self, layout: &Layout) {
+    /// Deselects the objects that a TPDO maps.
+    pub(crate) fn deselect(&mut self, layout: &Layout) {
         for watched in &mut self.watched {
-            watched.is_own &= !layout.contains(watched.field);
+            watched.is_selected &= !layout.contains(watched.field);
         }
     }
 
-    /// Entering Operational.
+    /// Sends all objects, on entering Operational.
     pub(crate) fn start(&mut self) {
         self.stop();
         if self.settings.is_some() {
@@ -129,60 +131,61 @@ impl<const M: usize> Scanner<M> {
     fn send_all(&mut self) {
         self.is_pending = false;
         for watched in &mut self.watched {
-            watched.is_pending = watched.is_own;
-            self.is_pending |= watched.is_own;
+            watched.is_pending = watched.is_selected;
+            self.is_pending |= watched.is_selected;
         }
     }
 
-    /// Leaving Operational.
+    /// Discards everything that waits, on leaving Operational.
     pub(crate) fn stop(&mut self) {
         self.watched.iter_mut().for_each(|watched| watched.is_pending = false);
         (self.is_pending, self.event_due, self.inhibited_until) = (false, Instant::NEVER, Instant(0));
     }
 
-    /// The next instant at which something is due.
+    /// When the next frame or the event timer is due.
     pub(crate) fn due(&self) -> Instant {
         if self.is_pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
     }
 
-    /// Watched values may have changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends the objects whose value has changed.
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
-            for watched in self.watched.iter_mut().filter(|watched| watched.is_own) {
+            for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
                 watched.is_pending |= watched.sent != Some(watched.value(image));
                 self.is_pending |= watched.is_pending;
             }
         }
-        self.poll(image, turn);
+        self.poll(image, context);
     }
 
-    /// Sends what is due: one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let Some(settings) = self.settings else { return };
-        let elapsed = turn.now >= self.event_due;
+        let elapsed = context.now >= self.event_due;
         if elapsed {
             self.send_all();
         }
         if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
-            self.event_due = turn.now + Duration::from_millis(settings.event.into());
+            self.event_due = context.now + Duration::from_millis(settings.event.into());
         }
         if !self.is_pending {
             return;
         }
         for watched in self.watched.iter_mut().filter(|watched| watched.is_pending) {
-            if turn.now < self.inhibited_until {
+            if context.now < self.inhibited_until {
                 return;
             }
             let data = watched.value(image);
-            // The next message has the same identifier and another object, so none takes the place of another.
-            if !turn.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
-                self.inhibited_until = turn.now + RETRY;
+            // All these frames have the same identifier but different objects: no frame may replace another in the
+            // queue.
+            if !context.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+                self.inhibited_until = context.now + RETRY;
                 return;
             }
             (watched.sent, watched.is_pending) = (Some(data), false);
             if settings.inhibit != 0 {
-                self.inhibited_until = turn.now + Duration::from_inhibit(settings.inhibit);
+                self.inhibited_until = context.now + Duration::from_inhibit(settings.inhibit);
             }
         }
         self.is_pending = false;

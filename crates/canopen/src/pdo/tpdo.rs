@@ -1,31 +1,31 @@
 //! One TPDO: when it is sent.
 //!
-//! The types 254 and 255 are sent on entering Operational and when the event timer elapses. Without an event timer, a PDO of
-//! type 255 is sent with every change of a mapped value, at most once per inhibit time. With one, the timer alone sends: a
-//! measured value changes a thousand times a second.
+//! The types 254 and 255 are sent on entering Operational and when the event timer elapses. Without an event timer, a
+//! TPDO of type 255 is sent with every change of a mapped value, at most once per inhibit time. With an event timer,
+//! only the timer sends it, because a measured value may change a thousand times a second.
 //!
-//! A TPDO that tells events is sent when the application has an event, and never because a value has changed. The inhibit time and
-//! the timer say when the application is asked for the events that wait with it.
+//! A TPDO that sends events is sent when the application has an event, and never because a value has changed. The
+//! inhibit time and the event timer determine when the application is asked for its waiting events.
 
 use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
-use crate::transmit::{RETRY, Turn};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
-/// Settings of a valid TPDO, from the objects 1800h.. and 1A00h...
+/// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     pub(crate) id: CanId,
-    /// Whether a remote frame is answered (bit 30 of the COB-ID is 0).
+    /// Whether remote frames are answered (bit 30 of the COB-ID is 0).
     pub(crate) answers_remote: bool,
     pub(crate) transmission: Transmission,
     /// Inhibit time in 100 us.
     pub(crate) inhibit: u16,
     /// Event timer in ms.
     pub(crate) event: u16,
-    /// SYNC counter with which the count of SYNCs begins; 0 for any.
+    /// SYNC start value: the counter value with which the counting of SYNCs begins; 0 for any.
     pub(crate) sync_start: u8,
-    /// The number of a TPDO that tells events.
+    /// For a TPDO that sends events: its number, 1 to 512.
     pub(crate) events_of: Option<u16>,
     pub(crate) layout: Layout,
 }
@@ -48,38 +48,39 @@ impl Settings {
     }
 }
 
-/// A TPDO and its timers. One that is not valid is in no chain, and of the methods only `configure` and `stop` are for it.
+/// A TPDO and its timers. Only valid TPDOs are in the chains; for a TPDO that is not valid, only `configure` and `stop`
+/// may be called.
 #[derive(Debug)]
 pub(crate) struct Tpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
     is_valid: bool,
     settings: Settings,
-    /// Something waits to be sent: an event within the inhibit time, or a frame that found the queue full.
+    /// A transmission waits: for the end of the inhibit time, or for room in the queue.
     pending: bool,
     /// SYNCs since the last transmission.
     syncs: u8,
-    /// The SYNC with the start value has come.
+    /// The SYNC with the start value has arrived.
     is_counting: bool,
-    /// Data as last sent, or as sampled with SYNC for type 252.
+    /// The data that was sent last; for type 252, the data sampled with the last SYNC.
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
     event_due: Instant,
-    /// Before this, an event waits.
+    /// The end of the inhibit time; earlier, a transmission waits.
     inhibited_until: Instant,
-    /// When to ask for events; used by a TPDO that tells events only.
+    /// When to ask the application for events. Used only for a TPDO that sends events.
     events: Events,
 }
 
-/// When the application is asked for events.
+/// When to ask the application for events.
 #[derive(Clone, Copy, Debug)]
-#[allow(clippy::struct_excessive_bools)] // Each says something of its own.
+#[allow(clippy::struct_excessive_bools)] // Independent flags.
 struct Events {
-    /// The last answer was an event: more may wait.
+    /// Events may wait in the application: ask again.
     may_wait: bool,
-    /// The event timer has elapsed, and not all that waited is sent.
+    /// The event timer has elapsed, and not all waiting events have been sent.
     is_open: bool,
-    /// The event timer has elapsed, and nothing is sent since then.
+    /// The event timer has elapsed, and nothing has been sent since.
     is_silent: bool,
 }
 
@@ -88,7 +89,8 @@ impl Events {
     const BEGIN: Events = Events { may_wait: true, is_open: true, is_silent: false };
 }
 
-/// Room that events leave in the transmit queue: the bus may be full for minutes, and the events can wait with the application.
+/// Free places that events leave in the transmit queue. The bus may be busy for minutes, but events can wait in the
+/// application.
 const ROOM_FOR_OTHERS: usize = 8;
 
 impl Tpdo {
@@ -107,24 +109,24 @@ impl Tpdo {
         }
     }
 
-    /// Takes new settings and starts afresh.
+    /// Takes new settings and discards the state of the old ones.
     pub(crate) fn configure(&mut self, settings: Option<Settings>) {
         self.is_valid = settings.is_some();
         self.settings = settings.unwrap_or(Settings::UNUSED);
         self.stop();
     }
 
-    /// The settings of a TPDO that is valid.
+    /// The settings of a valid TPDO.
     pub(crate) fn settings(&self) -> Option<&Settings> {
         self.is_valid.then_some(&self.settings)
     }
 
-    /// Whether something waits to be sent.
+    /// Whether a transmission waits.
     pub(crate) fn is_pending(&self) -> bool {
         self.pending
     }
 
-    /// Entering Operational, or becoming valid in it.
+    /// Triggers the first transmission, on entering Operational or when the TPDO becomes valid in it.
     pub(crate) fn start(&mut self) {
         self.stop();
         let events = self.events_of().is_some();
@@ -132,36 +134,41 @@ impl Tpdo {
         self.events = if events { Events::BEGIN } else { Events::NONE };
     }
 
-    /// The number of a TPDO that tells events.
+    /// For a TPDO that sends events: its number.
     pub(crate) fn events_of(&self) -> Option<u16> {
         self.settings.events_of
     }
 
-    /// The number of a TPDO that tells events, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, turn: &Turn<'_, impl Transmit>) -> Option<u16> {
+    /// For a TPDO that sends events: its number, if the application may be asked for an event now.
+    pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
-            && turn.now >= self.inhibited_until;
-        if is_asked_now && turn.room() <= ROOM_FOR_OTHERS {
-            (self.events.may_wait, self.inhibited_until) = (true, turn.now + RETRY);
+            && context.now >= self.inhibited_until;
+        if is_asked_now && context.room() <= ROOM_FOR_OTHERS {
+            (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
             return None;
         }
         settings.events_of.filter(|_| is_asked_now)
     }
 
-    /// The answer of the application: an event, which is in the image, or none.
-    pub(crate) fn take_event(&mut self, is_event: bool, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Handles the answer of the application. If `is_event`, the event is in the image.
+    pub(crate) fn take_event(
+        &mut self,
+        is_event: bool,
+        image: &[u8],
+        context: &mut Context<'_, impl Transmit>,
+    ) {
         if is_event || self.events.is_silent && self.data.is_some() {
-            self.send(image, turn);
+            self.send(image, context);
         }
         self.events.is_silent = false;
         self.events.may_wait = is_event;
         self.events.is_open &= is_event;
     }
 
-    /// When the application is to be asked again.
+    /// When to ask the application again.
     pub(crate) fn event_due(&self) -> Instant {
         let is_asked = self.events.may_wait
             && self.settings.transmission.is_event_driven()
@@ -169,36 +176,38 @@ impl Tpdo {
         if is_asked { self.inhibited_until } else { Instant::NEVER }
     }
 
-    /// Leaving Operational: nothing is due, a PDO that waits is dropped.
+    /// Discards a waiting transmission and all deadlines, on leaving Operational.
     pub(crate) fn stop(&mut self) {
         (self.pending, self.syncs, self.is_counting, self.data) = (false, 0, false, None);
         (self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));
         self.events = Events::NONE;
     }
 
-    /// The next instant at which something is due.
+    /// When the next transmission or the event timer is due.
     pub(crate) fn due(&self) -> Instant {
         if self.pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
     }
 
-    /// A SYNC arrived.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends or samples the values with a SYNC, depending on the transmission type.
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let transmission = self.settings.transmission;
         match transmission {
-            Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => self.send(image, turn),
-            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
+            Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
+                self.send(image, context);
+            }
+            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, context),
             Transmission::SyncRemote => self.data = Some(self.settings.layout.gather(image)),
             _ => (),
         }
     }
 
-    /// The number of a TPDO that tells events and may send one with a SYNC, whatever the type counts.
+    /// For a TPDO that sends events: its number, if a SYNC may send an event. For a cyclic type, every SYNC may.
     pub(crate) fn asks_with_sync(&self) -> Option<u16> {
         let is_asked = self.settings.transmission.is_synchronous() && !self.pending;
         self.settings.events_of.filter(|_| is_asked)
     }
 
-    /// Whether it is the turn of a cyclic synchronous PDO, with every n-th SYNC.
+    /// Counts SYNCs for a cyclic synchronous TPDO. Returns whether this SYNC sends it, which is every n-th one.
     fn is_sent_with(&mut self, sync: Sync, every: u8) -> bool {
         let start = self.settings.sync_start;
         self.is_counting |= sync.counter.is_none_or(|counter| start == 0 || start == counter);
@@ -212,43 +221,44 @@ impl Tpdo {
         is_turn
     }
 
-    /// A remote frame asks for it. The synchronous types 0 to 240 belong to the SYNC and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Answers a remote frame. TPDOs of the synchronous types 0 to 240 are sent by SYNC only and do not answer.
+    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
             return;
         }
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
-                // The client asks again if the queue is full: a sample of the past need not be kept for it.
-                turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                // In a full queue the sample is dropped: the client repeats its request.
+                context.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
-            // Before the first event there is nothing to tell.
+            // Before the first event, there is nothing to send.
             _ if settings.events_of.is_some() && self.data.is_none() => (),
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, turn);
+                self.send(image, context);
             }
             _ => (),
         }
     }
 
-    /// The application has found an event.
+    /// Requests a transmission for an event of the application.
     pub(crate) fn on_event(&mut self) {
         self.pending |= self.is_valid && self.settings.transmission.is_event_driven();
     }
 
-    /// Mapped values may have changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends the values if a mapped value has changed.
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         if self.settings.sends_on_change() && self.has_changed(image) {
             self.pending = true;
-            self.poll(image, turn);
+            self.poll(image, context);
         }
     }
 
-    /// The synchronous window is over: a synchronous PDO that still waits for room would be taken for one of the next.
+    /// Drops a synchronous TPDO that still waits at the end of the synchronous window: receivers would take it for a
+    /// TPDO of the next SYNC.
     pub(crate) fn drop_synchronous(&mut self) {
         let kind = self.settings.transmission;
-        // An event is not told again, so it is kept.
+        // An event is kept: the application does not give it again.
         self.pending &= self.events_of().is_some()
             || !matches!(kind, Transmission::SyncAcyclic | Transmission::SyncCyclic(_));
     }
@@ -257,20 +267,20 @@ impl Tpdo {
         self.data != Some(self.settings.layout.gather(image))
     }
 
-    /// Sends what is due.
-    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let elapsed = turn.now >= self.event_due;
-        let tells_events = self.events_of().is_some();
-        if elapsed || tells_events && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(turn.now);
+    /// Sends the TPDO if a transmission is due.
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+        let elapsed = context.now >= self.event_due;
+        let sends_events = self.events_of().is_some();
+        if elapsed || sends_events && self.event_due == Instant::NEVER {
+            self.event_due = self.following_event(context.now);
         }
-        if !tells_events {
+        if !sends_events {
             self.pending |= elapsed;
         } else if elapsed {
             self.events = Events { may_wait: true, is_open: true, is_silent: true };
         }
-        if self.pending && turn.now >= self.inhibited_until {
-            self.send(image, turn);
+        if self.pending && context.now >= self.inhibited_until {
+            self.send(image, context);
         }
     }
 
@@ -284,24 +294,24 @@ impl Tpdo {
         if self.event_due != Instant::NEVER && next > now { next } else { now + period }
     }
 
-    /// Sends the present values. A full queue leaves it pending: when there is room, the values of then go out.
-    fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+    /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
+    fn send(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let Settings { id, layout, transmission, inhibit, .. } = &self.settings;
         let data = layout.gather(image);
         let frame = Frame::data_frame(*id, layout.len(), data);
-        let tells_events = self.settings.events_of.is_some();
-        let is_sent = if tells_events { turn.send(frame) } else { turn.send_state(frame) };
+        let sends_events = self.settings.events_of.is_some();
+        let is_sent = if sends_events { context.send(frame) } else { context.send_state(frame) };
         self.pending = !is_sent;
         if is_sent {
             self.data = Some(data);
             if *inhibit != 0 {
-                self.inhibited_until = turn.now + Duration::from_inhibit(*inhibit);
+                self.inhibited_until = context.now + Duration::from_inhibit(*inhibit);
             }
         } else {
-            self.inhibited_until = turn.now + RETRY;
+            self.inhibited_until = context.now + RETRY;
         }
         if transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(turn.now);
+            self.event_due = self.following_event(context.now);
         }
     }
 }

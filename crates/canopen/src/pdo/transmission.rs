@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU8;
 
-/// When a TPDO is sent.
+/// The transmission type of a TPDO: when the TPDO is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transmission {
     /// 0: with the next SYNC after a change.
@@ -13,10 +13,11 @@ pub enum Transmission {
     SyncRemote,
     /// 253: sampled and sent on a remote frame.
     Remote,
-    /// 254: by event timer. The event that the manufacturer may add is none here, but for entering Operational.
+    /// 254: by event timer, and on entering Operational. CiA 301 leaves further events to the manufacturer; here
+    /// [`Device::send_tpdo`](crate::Device::send_tpdo) is the only one.
     Timer,
-    /// 255: by event timer; without one, with every change of a mapped value. What the event is, the device profile says:
-    /// CiA 404 and CiA 417 say this.
+    /// 255: by event timer; without one, with every change of a mapped value. CiA 301 leaves the event to the device
+    /// profile; CiA 404 and CiA 417 define it this way.
     Event,
 }
 
@@ -35,19 +36,20 @@ impl Transmission {
         }
     }
 
-    /// Whether neither SYNC nor a remote frame is needed to send it: 254 and 255.
+    /// Whether the PDO is sent without SYNC and remote frames: 254 and 255.
     #[must_use]
     pub const fn is_event_driven(self) -> bool {
         matches!(self, Transmission::Timer | Transmission::Event)
     }
 
-    /// Whether the SYNC sends or samples it: 0 to 240 and 252.
+    /// Whether SYNC sends or samples the PDO: 0 to 240 and 252.
     #[must_use]
     pub const fn is_synchronous(self) -> bool {
         matches!(self, Transmission::SyncAcyclic | Transmission::SyncCyclic(_) | Transmission::SyncRemote)
     }
 
-    /// Whether it is only sent on a remote frame, and so makes no sense where those are not allowed.
+    /// Whether the PDO is sent on remote frames only, and therefore requires that remote frames are allowed: 252 and
+    /// 253.
     #[must_use]
     pub const fn needs_remote(self) -> bool {
         matches!(self, Transmission::SyncRemote | Transmission::Remote)

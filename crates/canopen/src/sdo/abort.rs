@@ -1,22 +1,22 @@
 //! SDO abort codes (CiA 301, 7.2.4.3.17).
 
-/// Why a transfer was refused or given up. A byte in the code that passes it on; only the message has 32 bits.
+/// Why a transfer was refused or aborted. One byte in memory; `code` gives the 32 bits of the abort message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Abort {
     /// The toggle bit did not alternate.
     Toggle,
-    /// The other side was silent for too long.
+    /// The other side did not answer in time.
     TimeOut,
-    /// The command specifier is unknown or not valid now.
+    /// The command specifier is unknown, or not valid in this state.
     Command,
     /// The block size is not 1 to 127.
     BlockSize,
-    /// A sequence number that cannot be.
+    /// The sequence number is impossible.
     Sequence,
     /// The CRC does not match.
     Crc,
-    /// The access is not possible on this object, or not now.
+    /// The object does not support the access, or not now.
     Access,
     /// An attempt to read a write-only object.
     WriteOnly,
@@ -28,7 +28,7 @@ pub enum Abort {
     NotMappable,
     /// The mapped objects are longer than a PDO.
     PdoLength,
-    /// The value contradicts that of another parameter.
+    /// The value contradicts the value of another parameter.
     Parameter,
     /// The hardware has failed.
     Hardware,
@@ -46,7 +46,7 @@ pub enum Abort {
     ValueTooHigh,
     /// The value is below the lower limit.
     ValueTooLow,
-    /// Something that has no code of its own.
+    /// An error without a code of its own.
     General,
     /// The data cannot be stored.
     NotStored,

@@ -1,11 +1,11 @@
 //! The messages of block transfers: block size, segment, end.
 
-/// Segments in a block, 1 to 127.
+/// Number of segments in a block, 1 to 127.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct BlockSize(u8);
 
 impl BlockSize {
-    /// The most that the protocol allows.
+    /// The largest block size of the protocol.
     pub const MAX: BlockSize = BlockSize(127);
 
     /// `None` for 0 and above 127.
@@ -14,26 +14,26 @@ impl BlockSize {
         if matches!(segments, 1..=127) { Some(BlockSize(segments)) } else { None }
     }
 
-    /// The number.
+    /// The number of segments.
     #[must_use]
     pub const fn get(self) -> u8 {
         self.0
     }
 }
 
-/// One segment of a block. How much of the last one is data, only the end of the transfer says.
+/// One segment of a block. The end of the transfer tells how many bytes of the last segment are data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockSegment {
     /// No segment follows.
     pub last: bool,
-    /// Its place in the block, from 1.
+    /// Number of the segment in the block, from 1.
     pub sequence: BlockSize,
-    /// Its data.
+    /// The data of the segment.
     pub data: [u8; 7],
 }
 
 impl BlockSegment {
-    /// `None` for the sequence number 0, which an abort has.
+    /// `None` for the sequence number 0, which marks an abort message.
     #[must_use]
     pub fn parse(frame: [u8; 8]) -> Option<BlockSegment> {
         let [first, data @ ..] = frame;
@@ -41,7 +41,7 @@ impl BlockSegment {
         Some(BlockSegment { last: first & 0x80 != 0, sequence, data })
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     pub fn encode(self) -> [u8; 8] {
         let mut frame = [self.sequence.get() | u8::from(self.last) << 7; 8];
@@ -56,7 +56,7 @@ impl BlockSegment {
 pub struct BlockEnd {
     /// Bytes of the last segment that are not data, 0 to 7.
     pub unused: u8,
-    /// CRC of all the data.
+    /// CRC of all data.
     pub crc: u16,
 }
 
@@ -70,7 +70,7 @@ impl BlockEnd {
         [command | (self.unused & 7) << 2, low, high, 0, 0, 0, 0, 0]
     }
 
-    /// Of data of this length.
+    /// The end of a transfer of `len` bytes.
     #[must_use]
     pub fn of(len: usize, crc: u16) -> BlockEnd {
         let tail = if len == 0 { 0 } else { (len - 1) % 7 + 1 };

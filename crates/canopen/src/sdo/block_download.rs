@@ -9,16 +9,17 @@ use crate::Instant;
 pub(super) struct Receiver {
     sink: Sink,
     check_crc: bool,
-    /// Sequence number of the segment that comes next.
+    /// Sequence number of the next segment.
     next: u8,
-    /// The segment that came last, in sequence or not, if it may be the one that comes next. One that comes twice in a
-    /// row counts once.
+    /// The newest segment that `take` has processed, in sequence or not. A segment that arrives twice in a row counts
+    /// once.
     newest: Option<BlockSegment>,
-    /// What `next` was after the newest segment: where `next` has gone on, other segments have come since.
+    /// The value of `next` after that segment. If `next` has advanced, `take_next` has taken other segments since then.
     next_then: u8,
-    /// Something of this block has come.
+    /// Whether any segment of this block has arrived.
     has_begun: bool,
-    /// The last segment of all. How much of it is data, only the end says; nothing else is missing.
+    /// The last segment of the transfer, once it has arrived. The end of the transfer tells how many of its bytes are
+    /// data.
     last: Option<[u8; 7]>,
 }
 
@@ -27,18 +28,19 @@ impl Receiver {
         Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None }
     }
 
-    /// Whether frames are segments now, and not requests.
-    pub(super) fn wants_segments(&self) -> bool {
+    /// Whether the next frame is a segment and not a request.
+    pub(super) fn expects_segments(&self) -> bool {
         self.last.is_none()
     }
 
-    /// Whether a block has begun: if its last segment is lost, nobody would answer it.
+    /// Whether a block has begun and is not complete. If its last segment is lost, only a time-out can end the block.
     pub(super) fn is_within_block(&self) -> bool {
-        self.wants_segments() && self.has_begun
+        self.expects_segments() && self.has_begun
     }
 
-    /// Takes a frame that is the next segment of a block, neither the first nor the last, if the buffer has room for a whole
-    /// one: most frames of a transfer are nothing else. Whether the frame was taken.
+    /// Takes a frame that is the next segment of a block, if the buffer has room for a whole segment. Most frames of a
+    /// transfer take this fast path; the first and the last segment of a block do not. Returns whether the frame was
+    /// taken.
     #[inline]
     pub(super) fn take_next(&mut self, frame: &[u8; 8], buffer: &mut [u8; BUFFER]) -> bool {
         let [sequence, data @ ..] = frame;
@@ -49,7 +51,7 @@ impl Receiver {
         is_taken
     }
 
-    /// Takes a segment; `true` at the end of a block. Segments after a gap are left to be sent again.
+    /// Takes a segment. Returns `true` at the end of a block. The client sends segments after a gap again.
     pub(super) fn take(
         &mut self,
         segment: BlockSegment,
@@ -73,14 +75,14 @@ impl Receiver {
         if is_end {
             self.sink.hand_over(buffer, objects)?;
         } else {
-            // Neither the first segment of a block, which comes here, nor the last one.
+            // `take_next` may take the following segments, except for the last segment of the block.
             self.sink.allow_direct(BlockSize::MAX.get().saturating_sub(self.next).into());
         }
         self.next_then = self.next;
         Ok(is_end)
     }
 
-    /// The sequence number to acknowledge; the next block begins.
+    /// Begins the next block. Returns the sequence number to acknowledge.
     pub(super) fn acknowledge(&mut self) -> u8 {
         self.has_begun = false;
         self.next_then = 1;
@@ -88,7 +90,7 @@ impl Receiver {
         core::mem::replace(&mut self.next, 1) - 1
     }
 
-    /// The end of the transfer.
+    /// Completes the transfer.
     pub(super) fn end(
         &mut self,
         end: BlockEnd,

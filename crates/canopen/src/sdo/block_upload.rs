@@ -9,11 +9,11 @@ pub(super) struct Sender {
     source: Source,
     block_size: BlockSize,
     phase: Phase,
-    /// Bytes that the client has acknowledged: where this block begins.
+    /// Bytes that the client has acknowledged: the present block begins here.
     acknowledged: usize,
-    /// Segments of this block that are sent.
+    /// Number of segments of this block that have been sent.
     sequence: u8,
-    /// CRC of the first `checked` bytes. Segments sent again are not counted again.
+    /// CRC of the first `checked` bytes. Segments that are sent again do not count again.
     crc: u16,
     checked: usize,
 }
@@ -22,9 +22,9 @@ pub(super) struct Sender {
 enum Phase {
     /// The client has not asked for the first block.
     Ready,
-    /// Segments of a block go out.
+    /// The segments of a block are being sent.
     Sending,
-    /// A block is out, or all of them are and the end is.
+    /// The block has been sent, and waits for its acknowledgement.
     Waiting,
     Ended,
 }
@@ -34,12 +34,12 @@ impl Sender {
         Sender { source, block_size, phase: Phase::Ready, acknowledged: 0, sequence: 0, crc: 0, checked: 0 }
     }
 
-    /// Whether a segment can be sent now.
+    /// Whether segments of the block remain to be sent.
     pub(super) fn is_sending(&self) -> bool {
         self.phase == Phase::Sending
     }
 
-    /// The client is ready for the first block. It may say so twice.
+    /// Starts the first block. The client may repeat this request.
     pub(super) fn start(&mut self, is_repeated: bool) -> Result<(), Abort> {
         match self.phase {
             Phase::Ready => self.phase = Phase::Sending,
@@ -49,12 +49,12 @@ impl Sender {
         Ok(())
     }
 
-    /// The bytes before a segment of this block.
+    /// The offset of the data after the first `sequence` segments of this block.
     fn offset(&self, sequence: u8) -> usize {
         self.acknowledged + usize::from(sequence) * 7
     }
 
-    /// Sends segments of the block as long as `send` takes them.
+    /// Sends segments of the block as long as `send` accepts them.
     pub(super) fn send(
         &mut self,
         buffer: &[u8; BUFFER],
@@ -80,7 +80,7 @@ impl Sender {
         Ok(())
     }
 
-    /// Takes what has been sent into the CRC.
+    /// Adds the sent data to the CRC.
     fn check(&mut self, content: &[u8]) {
         let sent = self.offset(self.sequence).min(content.len());
         if let Some(new) = content.get(self.checked..sent) {
@@ -89,10 +89,11 @@ impl Sender {
         }
     }
 
-    /// The client has the block up to a segment and states the size of the next. The end, when it has everything.
+    /// Takes the acknowledgement of a block up to a segment, with the size of the next block. Returns the end of the
+    /// transfer when the client has all data.
     ///
-    /// One that comes while the block is still going out, or that has more than the block, is the last one repeated. The
-    /// last one of all is answered again.
+    /// An acknowledgement that arrives while the block is still being sent, or that names a later segment, may be a
+    /// repetition of the one before and is then ignored. A repetition of the final acknowledgement is answered again.
     pub(super) fn acknowledge(
         &mut self,
         sequence: u8,
@@ -119,13 +120,13 @@ impl Sender {
         BlockEnd::of(self.source.len(), self.crc)
     }
 
-    /// The client confirms the end.
+    /// Checks that the client may confirm the end now.
     pub(super) fn ended(&self) -> Result<(), Abort> {
         if self.phase == Phase::Ended { Ok(()) } else { Err(Abort::Command) }
     }
 }
 
-/// Seven bytes, the last of all filled with zeros, and what follows them.
+/// The next seven bytes, zeros after the last one, and the rest of the content.
 fn next_segment(content: &[u8]) -> ([u8; 7], &[u8]) {
     match content.split_first_chunk() {
         Some((data, rest)) => (*data, rest),

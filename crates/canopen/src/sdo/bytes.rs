@@ -1,8 +1,8 @@
-//! Up to `N` bytes, the rest zero.
+//! An array of up to `N` bytes.
 
-/// Up to `N` bytes (`N` below 256). What follows them is zero, so that equal content compares equal.
+/// Up to `N` bytes (`N` below 256). The unused rest is zero, so that equal content compares equal.
 ///
-/// The alignment makes it a number of words, also as a part of something else.
+/// The alignment makes the size a whole number of words, also inside another structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(align(4))]
 pub struct Bytes<const N: usize> {
@@ -42,13 +42,13 @@ impl<const N: usize> Bytes<N> {
     #[allow(clippy::cast_possible_truncation)] // N is below 256.
     const CAPACITY: u8 = N as u8;
 
-    /// How many there are.
+    /// Number of bytes.
     #[must_use]
     pub fn len(&self) -> u8 {
         self.len
     }
 
-    /// Whether there are none.
+    /// Whether there are no bytes.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
@@ -60,7 +60,7 @@ impl<const N: usize> Bytes<N> {
         self.data.get(..usize::from(self.len)).unwrap_or(&self.data)
     }
 
-    /// The bytes, then zeros.
+    /// All `N` bytes: the content, followed by zeros.
     #[must_use]
     pub fn padded(&self) -> [u8; N] {
         self.data

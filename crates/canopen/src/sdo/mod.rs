@@ -1,6 +1,6 @@
 //! SDO: access to the dictionary (CiA 301, 7.2.4). The messages, and the server that answers them.
 
-// A request is read where it lies: as a value it is two registers, and each of its bytes a shift.
+// A request is passed by reference: by value it would take two registers, and each access to a byte a shift.
 #![allow(clippy::trivially_copy_pass_by_ref)]
 
 mod abort;
@@ -23,7 +23,7 @@ pub use request::{Initiate, Request};
 pub use response::Response;
 pub(crate) use server::Server;
 
-/// The object of a transfer: index and sub-index, bytes 1 to 3 of the initiating frames.
+/// The object of a transfer: index and sub-index, bytes 1 to 3 of the frames that initiate a transfer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Multiplexer {
@@ -38,7 +38,7 @@ impl Multiplexer {
         Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
     }
 
-    /// A frame with it, its command specifier and four bytes.
+    /// The data of a frame: command specifier, this multiplexer and four bytes.
     pub(crate) const fn frame(self, command: u8, data: [u8; 4]) -> [u8; 8] {
         let head = command as u32 | (self.index as u32) << 8 | (self.sub as u32) << 24;
         let [command, low, high, sub] = head.to_le_bytes();
@@ -53,7 +53,7 @@ pub struct Segment {
     pub toggle: bool,
     /// No segment follows.
     pub last: bool,
-    /// Its data.
+    /// The data of the segment.
     pub data: Bytes<7>,
 }
 

@@ -1,41 +1,43 @@
-//! The objects as the server sees them, and the two ends of a transfer: the source of an upload and the sink of a download.
+//! The interface of the server to the objects, and the two ends of a transfer: the source of an upload and the sink of
+//! a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
 use crate::copy::copy;
 use crate::{Instant, Part};
 
-/// The longest value that is handed over in one piece, and how much of a stream is: whole segments, and whole words for
-/// the CRC and for copies.
+/// Size of the buffer in bytes: the longest value, and the longest part of a stream. A multiple of a segment (7), and
+/// of a word (4) for the CRC and for copies.
 pub(crate) const BUFFER: usize = 112;
 
-/// How an entry takes a download.
+/// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Writable {
-    /// As a whole, of at most this many bytes.
+    /// As one value of at most this many bytes.
     Value(usize),
-    /// Piece by piece: a domain.
+    /// In parts: a domain.
     Stream,
 }
 
-/// The dictionary with its values and rules.
+/// The dictionary with its values and rules, as the server uses it.
 pub(crate) trait Objects {
-    /// Whether there are block uploads.
+    /// Whether block uploads are supported.
     const BLOCK_UPLOAD: bool;
 
     /// The value of an entry.
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
-    /// How the entry can be written, if it can be at all.
+    /// How the entry accepts a download, or why it does not.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
-    /// Replaces the value of an entry and does what follows from it.
+    /// Replaces the value of an entry and applies its effect.
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
-    /// Whether the response to the write just made has to wait for [`Server::release`](super::Server::release); once.
+    /// Whether the response to the latest write has to wait for [`Server::release`](super::Server::release). Returns
+    /// `true` once.
     fn take_deferred(&mut self) -> bool;
     /// Hands over a part of a domain.
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
 }
 
-/// Where an upload comes from. A value that fits the buffer is a snapshot: it cannot change under way. A longer one
-/// (a domain) is read piece by piece.
+/// The data of an upload. A value that fits the buffer is copied there, so that it cannot change during the transfer. A
+/// longer value (a domain) is read part by part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
     at: Multiplexer,
@@ -55,12 +57,12 @@ impl Source {
         self.len
     }
 
-    /// The length in a frame.
+    /// The length as a number in a frame.
     pub(super) fn size(&self) -> u32 {
         u32::try_from(self.len).unwrap_or(u32::MAX)
     }
 
-    /// All of it. Fails when the domain has become shorter.
+    /// All data. Fails when the domain has become shorter.
     pub(super) fn content<'a>(
         &self,
         buffer: &'a [u8; BUFFER],
@@ -70,7 +72,7 @@ impl Source {
         content.get(..self.len).ok_or(Abort::General)
     }
 
-    /// The next up to seven bytes.
+    /// The next bytes from `offset` on, at most seven.
     pub(super) fn piece(
         &self,
         offset: usize,
@@ -82,32 +84,32 @@ impl Source {
     }
 }
 
-/// A length that is no longer than the buffer.
+/// Converts a length that is not larger than the buffer.
 #[allow(clippy::cast_possible_truncation)] // The buffer has 112 bytes.
 const fn in_buffer(len: usize) -> u8 {
     len as u8
 }
 
-/// Where a download goes: into the buffer, from where a value is written when it is complete, and a stream goes on
-/// whenever the buffer is full.
+/// The destination of a download. A value is collected in the buffer and written when it is complete. The data of a
+/// stream is passed on whenever the buffer is full.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sink {
     at: Multiplexer,
     kind: Writable,
     announced: Option<usize>,
-    /// The most bytes that it may have.
+    /// The maximum number of bytes of this download.
     limit: usize,
-    /// Bytes that have gone on, and their CRC.
+    /// Number of bytes that have been passed on, and their CRC.
     gone: usize,
     crc: u16,
-    /// Bytes in the buffer.
+    /// Number of bytes in the buffer.
     held: u8,
-    /// Up to this many bytes in the buffer, `append_direct` takes whole segments.
+    /// Up to this number of bytes in the buffer, `append_direct` takes whole segments.
     direct: u8,
 }
 
 impl Sink {
-    /// `TooLong` when the client announces more than there is room for.
+    /// Begins a download. `TooLong` when the client announces more bytes than there is room for.
     pub(super) fn open(
         at: Multiplexer,
         size: Option<u32>,
@@ -129,12 +131,12 @@ impl Sink {
         Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, direct: 0 })
     }
 
-    /// Bytes that have come.
+    /// Number of bytes received.
     fn len(&self) -> usize {
         self.gone.saturating_add(self.held.into())
     }
 
-    /// Takes up to seven bytes.
+    /// Appends up to seven bytes.
     #[inline(never)]
     pub(super) fn append(
         &mut self,
@@ -150,7 +152,7 @@ impl Sink {
             return Err(Abort::TooLong);
         }
         let place = buffer.get_mut(usize::from(self.held)..end).ok_or(Abort::TooLong)?;
-        // With a length that the compiler knows, the copy is two words.
+        // A copy of a length that is known at compile time takes two words.
         match (place.first_chunk_mut::<7>(), bytes.first_chunk()) {
             (Some(place), Some(segment)) => *place = *segment,
             _ => copy(place, bytes),
@@ -159,17 +161,18 @@ impl Sink {
         Ok(())
     }
 
-    /// Lets `append_direct` take at most this many segments, and no more than the buffer has room for.
+    /// Lets `append_direct` take at most this many segments, limited by the room in the buffer.
     pub(super) fn allow_direct(&mut self, segments: usize) {
         self.direct = in_buffer(self.most_held().min(usize::from(self.held) + 7 * segments));
     }
 
-    /// The most bytes that the buffer may hold, by its size and by the limit.
+    /// The maximum number of bytes in the buffer, given by its size and by the limit of the download.
     fn most_held(&self) -> usize {
         self.limit.saturating_sub(self.gone).min(BUFFER)
     }
 
-    /// Takes a whole segment if `allow_direct` has left room for it. With a length that the compiler knows, the copy is two words.
+    /// Appends a whole segment, if `allow_direct` has left room for it. A copy of a length that is known at compile
+    /// time takes two words.
     #[inline]
     pub(super) fn append_direct(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
         let start = usize::from(self.held);
@@ -184,7 +187,7 @@ impl Sink {
         true
     }
 
-    /// Passes on what is in the buffer, if it is part of a stream.
+    /// Passes on the content of the buffer, if it is part of a stream.
     pub(super) fn hand_over(
         &mut self,
         buffer: &[u8; BUFFER],
@@ -203,7 +206,7 @@ impl Sink {
         buffer.get(..self.held.into()).unwrap_or(&[])
     }
 
-    /// CRC of all that has come.
+    /// CRC of all bytes received.
     pub(super) fn crc(&self, buffer: &[u8; BUFFER]) -> u16 {
         crc::extend(self.crc, self.held(buffer))
     }

@@ -1,4 +1,4 @@
-//! Requests of an SDO client. Eight bytes are one of these or no request at all.
+//! Requests of an SDO client.
 
 use super::{BlockEnd, Bytes, Multiplexer, Segment, tail};
 
@@ -7,60 +7,60 @@ use super::{BlockEnd, Bytes, Multiplexer, Segment, tail};
 pub enum Request {
     /// Write: the first or only frame.
     Download(Multiplexer, Initiate),
-    /// Write: the next segment.
+    /// Write: a segment.
     DownloadSegment(Segment),
     /// Read: the first frame.
     Upload(Multiplexer),
-    /// Read: the next segment, please.
+    /// Read: asks for the next segment.
     UploadSegment {
         /// Alternates, starting with 0.
         toggle: bool,
     },
-    /// The client gives up.
+    /// The client aborts the transfer.
     Abort(Multiplexer, u32),
     /// Write in blocks: the first frame.
     BlockDownload {
         /// The object to write.
         at: Multiplexer,
-        /// The end will carry a CRC.
+        /// Whether the client will send a CRC at the end.
         crc: bool,
-        /// Bytes in all, where the client says so.
+        /// Total number of bytes, if the client announces it.
         size: Option<u32>,
     },
-    /// Write in blocks: the end. (Its segments are a [`BlockSegment`](super::BlockSegment) each.)
+    /// Write in blocks: the end. (Each segment is a [`BlockSegment`](super::BlockSegment).)
     BlockDownloadEnd(BlockEnd),
     /// Read in blocks: the first frame.
     BlockUpload {
         /// The object to read.
         at: Multiplexer,
-        /// The client can check a CRC.
+        /// Whether the client can check a CRC.
         crc: bool,
-        /// Segments in a block; refused if not 1 to 127.
+        /// Segments in a block. The server refuses a number outside 1 to 127.
         block_size: u8,
-        /// Up to this many bytes the server may switch to another transfer; 0 for never.
+        /// For an object of at most this many bytes, the server may choose another kind of transfer; 0 for never.
         threshold: u8,
     },
-    /// Read in blocks: send the first block.
+    /// Read in blocks: asks for the first block.
     BlockUploadStart,
-    /// Read in blocks: a block has arrived up to this segment, send the next.
+    /// Read in blocks: acknowledges a block and asks for the next one.
     BlockAcknowledge {
-        /// Last segment in sequence, 0 for none.
+        /// Number of the last segment received in sequence; 0 for none.
         sequence: u8,
-        /// Segments in the next block; refused if not 1 to 127.
+        /// Segments in the next block. The server refuses a number outside 1 to 127.
         block_size: u8,
     },
-    /// Read in blocks: all has arrived.
+    /// Read in blocks: confirms the end of the transfer.
     BlockUploadEnded,
 }
 
-/// How a download begins.
+/// The content of the first frame of a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Initiate {
-    /// All the data, one to four bytes.
+    /// All data, one to four bytes.
     Expedited(Bytes<4>),
-    /// All the data; the type says how many of the four bytes it is.
+    /// All data, without its size. The data type of the object tells how many of the four bytes are used.
     Unsized([u8; 4]),
-    /// Segments follow, of this many bytes in all where the client says so.
+    /// Segments follow. The total number of bytes, if the client announces it.
     Segmented(Option<u32>),
 }
 
@@ -99,7 +99,7 @@ impl Request {
         }
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     pub fn encode(self) -> [u8; 8] {
         match self {
@@ -124,7 +124,7 @@ impl Request {
 }
 
 impl Initiate {
-    /// The data in the frame, where they are all of the data and their size is given.
+    /// The data in the frame of an expedited download with a size; `None` for any other download.
     pub(super) fn expedited(frame: &[u8; 8]) -> Option<&[u8]> {
         let [command, _, _, _, data @ ..] = frame;
         let unused = usize::from(command >> 2 & 3);
@@ -143,7 +143,7 @@ impl Initiate {
 
     fn encode(self, multiplexer: Multiplexer) -> [u8; 8] {
         match self {
-            // An empty payload has no encoding: it goes out as one zero byte.
+            // Expedited data cannot be empty: empty data is sent as one zero byte.
             Initiate::Expedited(bytes) => {
                 multiplexer.frame(0x23 | (4 - bytes.len().max(1)) << 2, bytes.padded())
             }

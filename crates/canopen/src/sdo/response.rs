@@ -2,44 +2,45 @@
 
 use super::{BlockEnd, BlockSize, Bytes, Multiplexer, Segment, tail};
 
-/// A response of an SDO server. An abort carries the bare code, as a client may meet any.
+/// A response of an SDO server. An abort message has its code as a number, because a client may receive any code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Response {
-    /// Written, or ready for segments.
+    /// Write: done, or ready for segments.
     Downloaded(Multiplexer),
-    /// Segment written.
+    /// Write: a segment is accepted.
     DownloadedSegment {
         /// Toggle bit of the segment.
         toggle: bool,
     },
-    /// Read: all the data, one to four bytes; all four where the server leaves the size to the type.
+    /// Read: all data, one to four bytes. Four bytes if the server does not tell the size.
     Uploaded(Multiplexer, Bytes<4>),
-    /// Read: segments follow, of this many bytes in all where the server says so.
+    /// Read: segments follow. The total number of bytes, if the server announces it.
     UploadSegmented(Multiplexer, Option<u32>),
     /// Read: the next segment.
     UploadedSegment(Segment),
-    /// Refused or given up.
+    /// The server refuses or aborts the transfer.
     Abort(Multiplexer, u32),
-    /// Write in blocks: ready for the first. Not every server checks the CRC at the end; it comes all the same.
+    /// Write in blocks: ready for a first block of this size. Some servers do not check the CRC; the client sends it
+    /// anyway.
     BlockDownload(Multiplexer, BlockSize),
-    /// Write in blocks: a block has arrived up to this segment (0 for none), send the next in this size.
+    /// Write in blocks: acknowledges a block up to this segment (0 for none), with the size of the next block.
     BlockAcknowledge(u8, BlockSize),
-    /// Write in blocks: written.
+    /// Write in blocks: done.
     BlockDownloaded,
     /// Read in blocks: ready to send.
     BlockUpload {
-        /// The object that is read.
+        /// The object to read.
         at: Multiplexer,
-        /// The end will carry a CRC.
+        /// Whether the server will send a CRC at the end.
         crc: bool,
-        /// Bytes in all, where the server says so.
+        /// Total number of bytes, if the server announces it.
         size: Option<u32>,
     },
-    /// Read in blocks: that was all. (Its segments are a [`BlockSegment`](super::BlockSegment) each.)
+    /// Read in blocks: the end. (Each segment is a [`BlockSegment`](super::BlockSegment).)
     BlockUploadEnd(BlockEnd),
 }
 
-/// Command specifier: ready for a block download whose end carries a CRC.
+/// Command specifier of the response that begins a block download with CRC.
 const BLOCK_DOWNLOAD: u8 = 0xA4;
 
 impl Response {
@@ -81,15 +82,15 @@ impl Response {
         }
     }
 
-    /// Whether a frame is the response to what begins a block download.
+    /// Whether a frame of this server is the response that begins a block download.
     pub(super) fn begins_block_download(frame: &[u8; 8]) -> bool {
         frame[0] == BLOCK_DOWNLOAD
     }
 
-    /// The frame's data.
+    /// The data of the frame.
     #[must_use]
     #[inline(always)]
-    #[allow(clippy::inline_always)] // The server knows which response it makes: of the match one arm is left there.
+    #[allow(clippy::inline_always)] // The server knows the variant, so only one arm of the match remains.
     pub fn encode(self) -> [u8; 8] {
         match self {
             Response::Downloaded(multiplexer) => multiplexer.frame(0x60, [0; 4]),

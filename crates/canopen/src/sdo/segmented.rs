@@ -17,7 +17,7 @@ impl Upload {
         Upload { source, sent: 0, toggle: false }
     }
 
-    /// The next segment; its `last` ends the transfer.
+    /// The next segment. The transfer is over after a segment with `last`.
     pub(super) fn next(
         &mut self,
         requested: bool,
@@ -46,7 +46,7 @@ impl Download {
         Download { sink, toggle: false }
     }
 
-    /// Takes a segment; its `last` ends the transfer.
+    /// Takes a segment. The transfer is over after a segment with `last`.
     pub(super) fn take(
         &mut self,
         segment: &Segment,

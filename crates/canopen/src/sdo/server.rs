@@ -1,4 +1,4 @@
-//! The server: one transfer at a time, request in, response out.
+//! The SDO server: one transfer at a time, at most one response to each request.
 
 mod requests;
 
@@ -9,21 +9,22 @@ use super::segmented::{Download, Upload};
 use super::{Abort, BlockSegment, BlockSize, Multiplexer, Objects, Response};
 use crate::{Duration, Instant};
 
-/// How long the client of a transfer may be silent. CiA 301 leaves the time to the device.
+/// How long a client may be silent during a transfer. CiA 301 leaves the time to the device.
 const TIME_OUT: Duration = Duration::from_millis(1000);
-/// How long a client may pause within a block before it is told what has arrived: its last segment was lost.
+/// How long a client may be silent within a block. Then the last segment was lost, and the server acknowledges the
+/// segments that have arrived.
 const BLOCK_PAUSE: Duration = Duration::from_millis(300);
 
-/// The state of the one SDO channel (1200h).
+/// The state of the only SDO channel (1200h).
 #[derive(Debug)]
 pub(crate) struct Server {
     transfer: Transfer,
     multiplexer: Multiplexer,
-    /// The value under way: a snapshot for an upload, what has come so far of a download.
+    /// For an upload, a copy of the value; for a download, the data received so far.
     buffer: [u8; BUFFER],
-    /// When the transfer last went on.
+    /// The time of the last progress.
     active: Instant,
-    /// The last request of this transfer that could be one of a series, and whether `reply` answers it.
+    /// The last request that can be part of a series, and whether `reply` answers this request.
     previous: [u8; 8],
     is_answered: bool,
     /// The frame of the last response.
@@ -37,11 +38,11 @@ enum Transfer {
     Download(Download),
     BlockUpload(Sender),
     BlockDownload(Receiver),
-    /// All has arrived; the reply waits until the device has done what was asked.
-    Held,
+    /// All data has arrived. The reply waits until the device has carried out the write.
+    Deferred,
 }
 
-/// Whether there is a reply, or nothing to say yet.
+/// Whether there is a reply now.
 type Answer = Result<bool, Abort>;
 
 impl Server {
@@ -57,7 +58,7 @@ impl Server {
         }
     }
 
-    /// The response that was made last, as a frame.
+    /// The last response as a frame.
     pub(crate) fn reply(&self) -> [u8; 8] {
         self.reply
     }
@@ -77,7 +78,7 @@ impl Server {
         matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.is_within_block())
     }
 
-    /// When [`expire`](Server::expire) has something to do.
+    /// The next deadline of [`expire`](Server::expire).
     pub(crate) fn deadline(&self) -> Instant {
         match &self.transfer {
             Transfer::Idle => Instant::NEVER,
@@ -86,15 +87,15 @@ impl Server {
         }
     }
 
-    /// Forgets the transfer under way, without a word to the client: the NMT state no longer allows any.
+    /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
     pub(crate) fn reset(&mut self) {
         self.transfer = Transfer::Idle;
         self.multiplexer = Multiplexer { index: 0, sub: 0 };
         (self.previous, self.is_answered) = ([0; 8], false);
     }
 
-    /// Takes a frame that is a segment within a block and needs nothing but a place in the buffer; whether it is one. Any other
-    /// is for [`answer`](Server::answer). The deadline is not earlier afterwards.
+    /// Takes a frame that is a segment within a block and only has to be copied to the buffer. Returns whether the
+    /// frame was taken; if not, [`answer`](Server::answer) takes it. The deadline does not become earlier.
     #[inline]
     pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Instant) -> bool {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return false };
@@ -105,14 +106,14 @@ impl Server {
         is_taken
     }
 
-    /// Takes a request; whether there is a reply.
-    // The requests that begin a download or an upload are the most frequent ones. They belong to no series: nothing is to be
-    // compared with the request before, and nothing to be remembered.
+    /// Takes a request. Returns whether there is a reply.
+    // Requests that begin a download or an upload are the most frequent ones. They are not part of a series, so they
+    // are neither compared with the request before nor remembered.
     #[inline]
     pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
         let command = frame[0] >> 5;
-        if !matches!(command, 1 | 2) || self.wants_block_segments() {
-            self.go_on(frame, objects, now)
+        if !matches!(command, 1 | 2) || self.expects_block_segments() {
+            self.answer_in_series(frame, objects, now)
         } else if command == 1 {
             self.initiate_download(frame, objects, now)
         } else {
@@ -120,9 +121,9 @@ impl Server {
         }
     }
 
-    /// A request of a series: it may be the same as the one before.
+    /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
-    fn go_on(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
         let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
@@ -136,54 +137,56 @@ impl Server {
         has_reply
     }
 
-    /// Whether a frame that came twice gets the same answer twice, be it that the bus repeated it or that the client missed
-    /// the answer. Segments and the end of a block download change from one to the next; only they can be known as
-    /// repeated, and what begins a block download, as no first segment looks like it.
+    /// Whether a frame that repeats the one before gets the same answer again. Either the bus has repeated the frame,
+    /// or the client has missed the answer. Segments and the end of a block download qualify, because each differs from
+    /// the request before. So does the request that begins a block download, because no first segment of a block looks
+    /// like it.
     fn is_repeatable(&self, frame: &[u8; 8]) -> bool {
         let changes = matches!(frame[0] >> 5, 0 | 3) || frame[0] & 0xE1 == 0xC1;
-        Response::begins_block_download(&self.reply) || changes && !self.wants_block_segments()
+        Response::begins_block_download(&self.reply) || changes && !self.expects_block_segments()
     }
 
-    fn wants_block_segments(&self) -> bool {
-        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.wants_segments())
+    fn expects_block_segments(&self) -> bool {
+        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.expects_segments())
     }
 
-    /// Within a block a frame is a segment, unless its first byte is that of an abort. Afterwards it still is one
-    /// when it is the last one again.
+    /// The frame as a segment of a block download. Within a block, every frame is a segment, unless its first byte is
+    /// the one of an abort message. After the last block, only a repetition of the last segment is one.
     fn block_segment(&self, frame: &[u8; 8], is_repeated: bool) -> Option<BlockSegment> {
         let Transfer::BlockDownload(receiver) = &self.transfer else { return None };
         let segment = BlockSegment::parse(*frame)?;
-        (receiver.wants_segments() || is_repeated).then_some(segment)
+        (receiver.expects_segments() || is_repeated).then_some(segment)
     }
 
-    /// Makes a response: there is a reply, `true`.
+    /// Stores the frame of a response. Returns `true`: there is a reply.
     #[inline(always)]
     #[allow(clippy::inline_always)] // As for `encode`.
-    fn say(&mut self, response: Response) -> bool {
+    fn set_reply(&mut self, response: Response) -> bool {
         self.reply = response.encode();
         true
     }
 
-    /// The end of a request: an error ends the transfer, and the reply to a write that takes its time is kept back.
+    /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
     fn conclude(&mut self, answer: Answer, objects: &mut impl Objects, now: Instant) -> bool {
         if answer == Ok(true) && objects.take_deferred() {
-            self.transfer = Transfer::Held;
+            self.transfer = Transfer::Deferred;
             return self.settle(Ok(false), now);
         }
         self.settle(answer, now)
     }
 
-    /// Whether there is a reply that was kept back and for which its client still waits.
+    /// Reports the end of a write whose reply was held back. Returns whether there is a reply and its client still
+    /// waits.
     pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> bool {
-        if !matches!(self.transfer, Transfer::Held) {
+        if !matches!(self.transfer, Transfer::Deferred) {
             return false;
         }
         self.transfer = Transfer::Idle;
         self.settle(result.map(|()| true), now)
     }
 
-    /// Does what the time demands: answers a block that has lost its end, or gives up the transfer. Whether there is a
-    /// reply.
+    /// Handles a time-out: acknowledges a block whose last segment was lost, or aborts the transfer. Returns whether
+    /// there is a reply.
     pub(crate) fn expire(&mut self, now: Instant) -> bool {
         if now < self.deadline() {
             return false;
@@ -193,34 +196,35 @@ impl Server {
                 if receiver.is_within_block() && now < self.active + TIME_OUT =>
             {
                 let sequence = receiver.acknowledge();
-                self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX))
+                self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
             _ => self.settle(Err(Abort::TimeOut), now),
         }
     }
 
-    /// An error ends the transfer.
+    /// Converts the answer to whether there is a reply. An error ends the transfer.
     #[inline]
     fn settle(&mut self, answer: Answer, now: Instant) -> bool {
         self.active = now;
         answer.unwrap_or_else(|abort| self.give_up(abort))
     }
 
-    /// Ends the transfer: the one place where an error becomes an abort message.
+    /// Ends the transfer and stores the abort message.
     #[inline(never)]
     fn give_up(&mut self, abort: Abort) -> bool {
         self.transfer = Transfer::Idle;
         self.is_answered = false;
-        self.say(Response::Abort(self.multiplexer, abort.code()))
+        self.set_reply(Response::Abort(self.multiplexer, abort.code()))
     }
 
-    /// Whether segments of a block wait to be sent.
+    /// Whether segments of a block remain to be sent.
     #[inline]
     pub(crate) fn is_sending(&self) -> bool {
         matches!(&self.transfer, Transfer::BlockUpload(sender) if sender.is_sending())
     }
 
-    /// Sends segments of a block as long as `send` takes them. Whether there is a reply, which is an abort.
+    /// Sends segments of a block as long as `send` accepts them. Returns whether there is a reply, which is an abort
+    /// message.
     pub(crate) fn send_block(
         &mut self,
         objects: &impl Objects,

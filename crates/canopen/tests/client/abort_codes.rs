@@ -38,6 +38,6 @@ fn every_code_of_our_server_has_words() {
         Abort::DeviceState,
         Abort::NoData,
     ] {
-        assert!(AbortCode::from(abort).words().is_some(), "{abort:?}");
+        assert!(AbortCode::from(abort).meaning().is_some(), "{abort:?}");
     }
 }

@@ -305,7 +305,8 @@ fn a_block_leaves_room_in_the_queue() {
     assert_eq!(client.block().len(), 100);
 }
 
-/// A client that falls silent within a block is told what has come, also in a later block of which only the first segment comes.
+/// If a client pauses within a block, the server acknowledges the segments that have arrived; also in a later block of
+/// which only the first segment has arrived.
 #[test]
 fn a_pause_within_any_block_is_answered() {
     for (at, size, blocks) in [(DOMAIN, 70, [(0, 3), (3, 1), (4, 1)]), (TEXT, 20, [(0, 0), (0, 1), (1, 1)])] {
@@ -321,13 +322,13 @@ fn a_pause_within_any_block_is_answered() {
     }
 }
 
-/// What comes twice in a row counts once; what comes again later is what was missing.
+/// A segment that arrives twice in a row counts once. A segment that arrives again later is the missing one.
 #[test]
 fn a_segment_that_came_too_early_is_taken_when_its_turn_has_come() {
     let mut client = Client::new();
     let content = data(35);
     client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(35) });
-    // The third segment overtakes the second one. Then the third one comes again, in its place.
+    // The third segment overtakes the second one, and arrives again after it.
     for number in [0, 2, 1, 2, 3] {
         assert_eq!(client.send_segment(segment(&content, number, number as u8 + 1)), None);
     }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// The services that have an answer.
+/// The services with an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Name {
     /// Switch state selective.

@@ -1,4 +1,4 @@
-//! A service with an answer.
+//! An LSS service with an answer.
 
 use super::{Error, Name, Options, frame, response};
 use crate::client::service::later;
@@ -7,34 +7,39 @@ use crate::lss::{Request, Response};
 use crate::{Frame, Instant};
 
 /// Interprets a response to the last request; `None` for a response that does not answer the request.
-type Fits<T> = fn(Request, Response) -> Option<Result<T, Error>>;
+type Interpret<T> = fn(Request, Response) -> Option<Result<T, Error>>;
 
-/// Up to four requests and the answer to the last of them. All requests are sent again when there is no answer: none of
-/// them does harm when it comes twice.
+/// Up to four requests and the answer to the last request. Without an answer, all requests are sent again: none of
+/// them does harm when it arrives twice.
 #[derive(Clone, Copy, Debug)]
 pub struct Exchange<T> {
     name: Name,
     requests: [Option<Request>; 4],
-    fits: Fits<T>,
+    interpret: Interpret<T>,
     options: Options,
-    /// Requests that have been sent, of this attempt.
+    /// How many requests of this attempt have been sent.
     sent: usize,
     until: Instant,
     answer: Option<Result<T, Error>>,
 }
 
 impl<T> Exchange<T> {
-    pub(super) fn new(name: Name, request: Request, fits: Fits<T>, options: Options) -> Exchange<T> {
-        Exchange::of([Some(request), None, None, None], name, fits, options)
+    pub(super) fn new(
+        name: Name,
+        request: Request,
+        interpret: Interpret<T>,
+        options: Options,
+    ) -> Exchange<T> {
+        Exchange::of([Some(request), None, None, None], name, interpret, options)
     }
 
     pub(super) fn of(
         requests: [Option<Request>; 4],
         name: Name,
-        fits: Fits<T>,
+        interpret: Interpret<T>,
         options: Options,
     ) -> Exchange<T> {
-        Exchange { name, requests, fits, options, sent: 0, until: Instant::NEVER, answer: None }
+        Exchange { name, requests, interpret, options, sent: 0, until: Instant::NEVER, answer: None }
     }
 
     fn pending(&self) -> Option<Request> {
@@ -67,7 +72,7 @@ impl<T: Copy> Service for Exchange<T> {
         let is_waiting = self.pending().is_none() && self.answer.is_none();
         let last = self.sent.checked_sub(1).and_then(|last| self.requests.get(last).copied().flatten());
         let Some(request) = last.filter(|_| is_waiting) else { return Taken::Ignored };
-        self.answer = (self.fits)(request, response);
-        if self.answer.is_some() { Taken::Used } else { Taken::Unfit }
+        self.answer = (self.interpret)(request, response);
+        if self.answer.is_some() { Taken::Used } else { Taken::Unexpected }
     }
 }

@@ -6,50 +6,52 @@ use crate::client::{Service, Step, Taken};
 use crate::lss::{Identity, Request, Response};
 use crate::{Duration, Frame, Instant};
 
-/// Finds one slave that has no node-ID and leaves it in the state configuration. The output is `None` when there is none.
+/// Finds one slave that has no node-ID and puts it into the configuration state. The output is `None` when no slave
+/// answers.
 ///
-/// All slaves that match a question answer it with the same frame, so any number of them may be there. Silence means a
-/// bit of 1. A question takes the whole time-out, or a quarter of it after the last answer: other slaves may answer a
-/// little later. A lost answer makes the identity wrong, which the question after each part of it finds out: the search then
-/// begins anew, as often as the options say.
+/// All slaves that match a question answer with the same frame, so the number of slaves does not matter. Silence means
+/// that the bit is 1. A question takes the whole time-out. After an answer it takes another quarter of the time-out,
+/// because other slaves may answer a little later. A lost answer makes the identity wrong; the question at the end of
+/// each part detects this, and the search begins anew, as often as [`Options::retries`] allows.
 #[derive(Clone, Copy, Debug)]
 pub struct Fastscan {
     options: Options,
     question: Question,
-    /// The parts of the identity as far as they are known.
+    /// The known bits of the identity; 0 where a bit is not known yet.
     found: [u32; 4],
-    /// When the question is over; `None` before it is sent.
+    /// When the question ends; `None` before the question is sent.
     until: Option<Instant>,
-    /// When the question is over however many answers still come.
+    /// When the question ends at the latest, however many answers arrive.
     latest: Instant,
     is_answered: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Question {
-    /// All slaves back to the state waiting, before another attempt. It has no answer.
+    /// Switches all slaves to the waiting state before another attempt. This request has no answer.
     Release,
-    /// Is there anybody?
+    /// Is there any slave without a node-ID?
     Anybody,
-    /// Is this bit of this part 0?
+    /// `Bit(part, bit)`: is this bit of this part of the identity 0?
     Bit(u8, u8),
-    /// Is this part right?
+    /// Is this part of the identity right?
     Part(u8),
     Over(Result<Option<Identity>, Error>),
 }
 
 impl Fastscan {
-    /// Questions of a search that finds a slave: whether there is any, and for each part its bits and whether it is right.
+    /// Questions of a successful search: whether there is any slave, and for each part 32 bits and the check of the
+    /// part.
     pub const QUESTIONS: u8 = 1 + 4 * 33;
 
-    /// A search with these time-outs.
+    /// A search with the time-out and the retries of `options`.
     #[must_use]
     pub const fn new(options: Options) -> Fastscan {
         let question = Question::Anybody;
         Fastscan { options, question, found: [0; 4], until: None, latest: Instant::NEVER, is_answered: false }
     }
 
-    /// How many questions have been asked, of [`QUESTIONS`](Fastscan::QUESTIONS).
+    /// How many of the [`QUESTIONS`](Fastscan::QUESTIONS) have been asked.
     #[must_use]
     pub const fn asked(&self) -> u8 {
         match self.question {
@@ -64,20 +66,20 @@ impl Fastscan {
         self.found.get(usize::from(part)).copied().unwrap_or(0)
     }
 
-    /// The frame of the question; `None` at the end.
+    /// The frame of the question; `None` after the last question.
     fn request(&self) -> Option<Frame> {
         let fastscan = |value, bit, part, next| Some(frame(Request::Fastscan { value, bit, part, next }));
         match self.question {
             Question::Release => Some(switch_global(false)),
             Question::Anybody => fastscan(0, Request::CONFIRM, 0, 0),
             Question::Bit(part, bit) => fastscan(self.part(part), bit, part, part),
-            // The slave goes on to the next part, and after the last it is selected.
+            // The slave goes on to the next part. After the last part, the slave is selected.
             Question::Part(part) => fastscan(self.part(part), 0, part, (part + 1) % 4),
             Question::Over(_) => None,
         }
     }
 
-    /// Goes on after an answer, or after silence.
+    /// The next question, after an answer or after silence.
     fn following(&mut self) -> Question {
         match (self.question, self.is_answered) {
             (Question::Release, _) => Question::Anybody,

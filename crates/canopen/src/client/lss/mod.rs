@@ -1,7 +1,7 @@
 //! The LSS master (CiA 305): finds devices by their identity and gives them a node-ID and a bit rate.
 //!
-//! Most services are an [`Exchange`]: one slave is in the state configuration and answers. [`Fastscan`] finds a slave
-//! that has no node-ID, among any number of them. Two services have no answer and are one [`Frame`] each:
+//! Most services are an [`Exchange`]: one slave is in the configuration state and answers. [`Fastscan`] finds one slave
+//! without a node-ID among any number of them. Two services have no answer and are one [`Frame`] each:
 //! [`switch_global`] and [`activate_bit_rate`].
 //!
 //! ```
@@ -37,12 +37,12 @@ pub use services::{
 use crate::lss::{REQUEST, RESPONSE, Request, Response};
 use crate::{Duration, Frame};
 
-/// How patient a master is.
+/// Time-out and retries of a master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// How long a slave may take to answer.
+    /// The longest time until a slave answers.
     pub timeout: Duration,
-    /// How often a request that got no answer is sent again.
+    /// How often a request without an answer is sent again.
     pub retries: u8,
 }
 

@@ -1,16 +1,17 @@
-//! SDO abort codes in words.
+//! SDO abort codes and their meaning as text.
 
 use core::fmt;
 
 use crate::sdo::Abort;
 
-/// Why a server refused or gave up a transfer (CiA 301, 7.2.4.3.17): any code, also those of other standards and of vendors.
+/// Why a server refused or gave up a transfer (CiA 301, 7.2.4.3.17). Codes of other standards and of vendors are valid
+/// too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AbortCode(pub u32);
 
-/// CiA 301, 7.2.4.3.17.
+/// Abort codes and their meaning (CiA 301, 7.2.4.3.17).
 #[rustfmt::skip]
-const WORDS: [(u32, &str); 31] = [
+const MEANINGS: [(u32, &str); 31] = [
     (0x0503_0000, "toggle bit not alternated"),
     (0x0504_0000, "SDO protocol timed out"),
     (0x0504_0001, "command specifier not valid or unknown"),
@@ -47,8 +48,8 @@ const WORDS: [(u32, &str); 31] = [
 impl AbortCode {
     /// Meaning of the code; `None` where CiA 301 defines none.
     #[must_use]
-    pub fn words(self) -> Option<&'static str> {
-        WORDS.iter().find(|row| row.0 == self.0).map(|row| row.1)
+    pub fn meaning(self) -> Option<&'static str> {
+        MEANINGS.iter().find(|row| row.0 == self.0).map(|row| row.1)
     }
 
     /// Whether there is no such object or sub-index.
@@ -57,7 +58,7 @@ impl AbortCode {
         self == Abort::NoObject.into() || self == Abort::NoSubIndex.into()
     }
 
-    /// Whether the server does not like the protocol and not the value: another kind of transfer may do.
+    /// Whether the server refused the protocol and not the value: another kind of transfer may succeed.
     #[must_use]
     pub fn is_protocol(self) -> bool {
         matches!(self.0 >> 16, 0x0503 | 0x0504)
@@ -70,11 +71,11 @@ impl From<Abort> for AbortCode {
     }
 }
 
-/// `0609 0030h, invalid value for the parameter`
+/// For example `0609 0030h, invalid value for the parameter`.
 impl fmt::Display for AbortCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words = self.words().unwrap_or("a code that CiA 301 does not define");
-        write!(f, "{:04X} {:04X}h, {words}", self.0 >> 16, self.0 & 0xFFFF)
+        let meaning = self.meaning().unwrap_or("a code that CiA 301 does not define");
+        write!(f, "{:04X} {:04X}h, {meaning}", self.0 >> 16, self.0 & 0xFFFF)
     }
 }
 
@@ -84,6 +85,6 @@ mod tests {
 
     #[test]
     fn the_table_is_sorted_without_doubles() {
-        assert!(WORDS.is_sorted_by(|a, b| a.0 < b.0));
+        assert!(MEANINGS.is_sorted_by(|a, b| a.0 < b.0));
     }
 }

@@ -6,60 +6,60 @@ use super::{BlockDownload, Error, Options};
 use crate::sdo::{BlockEnd, BlockSegment, BlockSize, Bytes, Multiplexer, Request, Response, crc};
 use crate::{Instant, NodeId};
 
-/// So many blocks in a row of which nothing arrives, and the transfer has failed.
-const FUTILE: u8 = 3;
+/// The transfer fails after this many blocks in a row without a segment that the server acknowledged.
+const MAX_EMPTY_BLOCKS: u8 = 3;
 
 /// A block download under way.
 #[derive(Debug)]
 pub struct Protocol<'a> {
     data: &'a [u8],
-    /// Bytes that the server has acknowledged: where the block begins.
+    /// Bytes that the server has acknowledged: the present block begins here.
     done: usize,
     phase: Phase,
-    /// Blocks in a row of which nothing has arrived.
-    futile: u8,
+    /// Blocks in a row of which the server acknowledged no segment.
+    empty_blocks: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Phase {
-    /// The server has not said how long a block may be.
+    /// The server has not yet announced the size of a block.
     Begin,
     Block {
         size: BlockSize,
-        /// Segments of this block that have been handed over.
+        /// Segments of this block that have been sent.
         sent: u8,
     },
-    /// All has arrived; the server has not said that it is good.
+    /// The server has acknowledged all data, but has not yet confirmed the CRC.
     End,
 }
 
 impl<'a> BlockDownload<'a> {
-    /// Writes an object of a node. No data at all is one segment that has none.
+    /// Writes an object of a node. Empty data is sent as one segment without bytes.
     #[must_use]
     pub fn new(node: NodeId, at: Multiplexer, data: &'a [u8], options: Options) -> BlockDownload<'a> {
-        Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, futile: 0 }, node, at, options)
+        Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, empty_blocks: 0 }, node, at, options)
     }
 }
 
 impl Protocol<'_> {
-    /// What comes after so many segments of the block.
+    /// The data that follows the first `sent` segments of the block.
     fn rest(&self, sent: u8) -> &[u8] {
         let offset = self.done.saturating_add(7 * usize::from(sent));
         self.data.get(offset..).unwrap_or(&[])
     }
 
-    /// How many segments the block has: as many as there are, up to the size that the server wants.
+    /// The number of segments in the block: the remaining ones, up to the block size of the server.
     fn len(&self, size: BlockSize) -> u8 {
         let segments = self.rest(0).len().div_ceil(7).max(1);
         u8::try_from(segments).map_or(size.get(), |segments| segments.min(size.get()))
     }
 
-    /// The server has the block up to this segment. What it does not have goes out again, in the next block.
+    /// The server has the block up to this segment. The remaining segments are sent again in the next block.
     fn acknowledge(&mut self, sequence: u8, next: BlockSize, link: &mut Link) -> Result<Progress, Error> {
         let is_all = 7 * usize::from(sequence) >= self.rest(0).len() && sequence > 0;
         self.done = self.done.saturating_add(7 * usize::from(sequence)).min(self.data.len());
-        self.futile = if sequence == 0 { self.futile.saturating_add(1) } else { 0 };
-        if self.futile == FUTILE {
+        self.empty_blocks = if sequence == 0 { self.empty_blocks.saturating_add(1) } else { 0 };
+        if self.empty_blocks == MAX_EMPTY_BLOCKS {
             return Err(Error::Unexpected);
         }
         if is_all {
@@ -69,13 +69,13 @@ impl Protocol<'_> {
         } else {
             self.phase = Phase::Block { size: next, sent: 0 };
         }
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 }
 
 impl transfer::Protocol for Protocol<'_> {
     fn begin(&mut self, link: &mut Link) {
-        (self.done, self.phase, self.futile) = (0, Phase::Begin, 0);
+        (self.done, self.phase, self.empty_blocks) = (0, Phase::Begin, 0);
         let size = u32::try_from(self.data.len()).ok();
         link.begin(Request::BlockDownload { at: link.at, crc: true, size });
     }
@@ -88,7 +88,7 @@ impl transfer::Protocol for Protocol<'_> {
             BlockSegment { last: rest.len() <= 7, sequence, data: Bytes::from_slice(rest).padded() };
         self.phase = Phase::Block { size, sent: sequence.get() };
         if sequence.get() == self.len(size) {
-            // Two blocks of the same size have the same acknowledgement.
+            // Acknowledgements of two blocks of the same size are equal.
             link.expect_equal();
         }
         Some(segment.encode())
@@ -98,7 +98,7 @@ impl transfer::Protocol for Protocol<'_> {
         match (self.phase, Response::parse(data)) {
             (Phase::Begin, Some(Response::BlockDownload(of, size))) if of == link.at => {
                 self.phase = Phase::Block { size, sent: 0 };
-                Ok(Progress::Goes)
+                Ok(Progress::Continues)
             }
             (Phase::Block { size, sent }, Some(Response::BlockAcknowledge(sequence, next)))
                 if sent == self.len(size) && sequence <= sent =>
@@ -106,7 +106,7 @@ impl transfer::Protocol for Protocol<'_> {
                 self.acknowledge(sequence, next, link)
             }
             (Phase::End, Some(Response::BlockDownloaded)) => Ok(Progress::Complete),
-            _ => Ok(Progress::Unfit),
+            _ => Ok(Progress::Unexpected),
         }
     }
 

@@ -7,40 +7,40 @@ use super::{BlockUpload, Error, Options, upload};
 use crate::sdo::{BlockEnd, BlockSegment, Multiplexer, Request, Response, crc};
 use crate::{Duration, Instant, NodeId};
 
-/// A pause within a block means that its last segment was lost. Shorter than what servers grant the client.
+/// A pause of this length within a block means that its last segment was lost. The time-out of servers is longer.
 const PAUSE: Duration = Duration::from_millis(250);
-/// So many blocks in a row of which nothing arrives, and the transfer has failed.
-const FUTILE: u8 = 3;
+/// The transfer fails after this many blocks in a row without a segment in sequence.
+const MAX_EMPTY_BLOCKS: u8 = 3;
 
 /// A block upload under way.
 #[derive(Debug)]
 pub struct Protocol<S> {
-    /// The sink, and the simpler transfer that a server may choose.
+    /// The sink, and the protocol without blocks, which a server may choose instead.
     simple: upload::Protocol<S>,
     phase: Phase,
-    /// The end will carry a CRC.
+    /// Whether the server will send a CRC at the end.
     has_crc: bool,
-    /// Bytes in all, where the server says so.
+    /// Total number of bytes, if the server announces it.
     size: Option<usize>,
-    /// The newest segment. How much of the last one is data, only the end says.
+    /// The newest segment. Only the end of the transfer tells how many bytes of the last segment are data.
     held: Option<[u8; 7]>,
     /// Bytes in the sink.
     received: usize,
     /// CRC of the bytes in the sink.
     crc: u16,
-    /// Blocks in a row of which nothing has arrived.
-    futile: u8,
+    /// Blocks in a row without a segment in sequence.
+    empty_blocks: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Phase {
-    /// The server has not said how it sends the data.
+    /// The server has not chosen the kind of transfer yet.
     Begin,
-    /// It has chosen the simpler transfer.
+    /// The server has chosen an expedited or segmented transfer.
     Simple,
-    /// Segments come, up to this one in sequence.
+    /// Segments are arriving; this one was the last in sequence.
     Block(u8),
-    /// All segments have come; the server has not said how much of the last one is data.
+    /// All segments have arrived; the server has not yet told how many bytes of the last one are data.
     End,
 }
 
@@ -56,12 +56,12 @@ impl<S: Sink> BlockUpload<S> {
             held: None,
             received: 0,
             crc: 0,
-            futile: 0,
+            empty_blocks: 0,
         };
         Transfer::with(protocol, node, at, options)
     }
 
-    /// The sink with what has come.
+    /// The sink with the received bytes.
     #[must_use]
     pub fn into_sink(self) -> S {
         self.protocol.simple.into_sink()
@@ -81,12 +81,12 @@ impl<S: Sink> Protocol<S> {
         self.size = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
         self.phase = Phase::Block(0);
         link.ask(Request::BlockUploadStart);
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 
     fn on_simple(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error> {
         let progress = transfer::Protocol::on_response(&mut self.simple, data, link, now)?;
-        if progress == Progress::Goes {
+        if progress == Progress::Continues {
             self.phase = Phase::Simple;
         }
         Ok(progress)
@@ -110,10 +110,10 @@ impl<S: Sink> Protocol<S> {
         } else {
             link.wait(PAUSE.min(link.options.timeout), now);
         }
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 
-    /// Keeps a segment back; the one before it has turned out not to be the last.
+    /// Holds a segment back, and hands the segment before it to the sink: that one was not the last.
     fn hold(&mut self, data: [u8; 7]) -> Result<(), Error> {
         match self.held.replace(data) {
             Some(before) => self.append(&before),
@@ -130,16 +130,16 @@ impl<S: Sink> Protocol<S> {
         if self.simple.sink().append(data) { Ok(()) } else { Err(Error::TooLong) }
     }
 
-    /// The block is over. What did not come in sequence is sent again in the next one.
+    /// Acknowledges a block. The server sends segments that did not arrive in sequence again in the next block.
     fn acknowledge(&mut self, sequence: u8, is_all: bool, link: &mut Link) -> Result<(), Error> {
-        self.futile = if sequence == 0 { self.futile.saturating_add(1) } else { 0 };
-        if self.futile == FUTILE {
+        self.empty_blocks = if sequence == 0 { self.empty_blocks.saturating_add(1) } else { 0 };
+        if self.empty_blocks == MAX_EMPTY_BLOCKS {
             return Err(Error::Unexpected);
         }
         self.phase = if is_all { Phase::End } else { Phase::Block(0) };
         let block_size = link.options.block_size.get();
         if block_size == 1 {
-            // All segments have the number 1: two may be equal.
+            // All segments have the number 1, so two segments in a row may be equal.
             link.expect_equal();
         }
         link.ask(Request::BlockAcknowledge { sequence, block_size });
@@ -148,7 +148,7 @@ impl<S: Sink> Protocol<S> {
 
     fn on_end(&mut self, end: BlockEnd, link: &mut Link) -> Result<Progress, Error> {
         let held = self.held.take().unwrap_or_default();
-        // Some servers say that a full last segment has 7 unused bytes. Where there is a size, it tells.
+        // Some servers report 7 unused bytes for a last segment that is full. The announced size, if any, decides.
         let is_full = end.unused == 7 && self.size == Some(self.received.saturating_add(7));
         let used = if is_full { 7 } else { 7 - usize::from(end.unused.min(7)) };
         self.append(held.get(..used).unwrap_or(&held))?;
@@ -166,7 +166,7 @@ impl<S: Sink> Protocol<S> {
 impl<S: Sink> transfer::Protocol for Protocol<S> {
     fn begin(&mut self, link: &mut Link) {
         self.simple.reset();
-        (self.phase, self.held, self.received, self.crc, self.futile) = (Phase::Begin, None, 0, 0, 0);
+        (self.phase, self.held, self.received, self.crc, self.empty_blocks) = (Phase::Begin, None, 0, 0, 0);
         let block_size = link.options.block_size.get();
         link.begin(Request::BlockUpload { at: link.at, crc: true, block_size, threshold: 0 });
     }
@@ -177,16 +177,16 @@ impl<S: Sink> transfer::Protocol for Protocol<S> {
             Phase::Simple => self.on_simple(data, link, now),
             Phase::Block(before) => match BlockSegment::parse(data) {
                 Some(segment) => self.on_segment(segment, before, link, now),
-                None => Ok(Progress::Unfit),
+                None => Ok(Progress::Unexpected),
             },
             Phase::End => match Response::parse(data) {
                 Some(Response::BlockUploadEnd(end)) => self.on_end(end, link),
-                _ => Ok(Progress::Unfit),
+                _ => Ok(Progress::Unexpected),
             },
         }
     }
 
-    /// The last segments of a block are lost: what has come of it is acknowledged.
+    /// The last segments of a block are lost: acknowledges the segments that have arrived.
     fn on_silence(&mut self, link: &mut Link) -> Result<(), Error> {
         match self.phase {
             Phase::Block(sequence @ 1..) => self.acknowledge(sequence, false, link),

@@ -12,7 +12,7 @@ pub struct Protocol<'a> {
     data: &'a [u8],
     /// Bytes that the server has acknowledged.
     done: usize,
-    /// The segment that waits for its acknowledgement; `None` while the first request does.
+    /// The segment that waits for its acknowledgement; `None` while the initiate request waits.
     segment: Option<Sent>,
 }
 
@@ -50,7 +50,7 @@ impl Protocol<'_> {
             return Progress::Complete;
         }
         self.send(false, link);
-        Progress::Goes
+        Progress::Continues
     }
 
     fn on_acknowledged(&mut self, sent: Sent, link: &mut Link) -> Progress {
@@ -59,7 +59,7 @@ impl Protocol<'_> {
             return Progress::Complete;
         }
         self.send(!sent.toggle, link);
-        Progress::Goes
+        Progress::Continues
     }
 }
 
@@ -80,7 +80,7 @@ impl transfer::Protocol for Protocol<'_> {
             (Some(sent), Some(Response::DownloadedSegment { toggle })) if toggle == sent.toggle => {
                 self.on_acknowledged(sent, link)
             }
-            _ => Progress::Unfit,
+            _ => Progress::Unexpected,
         })
     }
 

@@ -12,23 +12,23 @@ pub enum Error {
     Abort(AbortCode),
     /// The server did not answer in time.
     NoAnswer,
-    /// The server said what the protocol does not allow here.
+    /// The answer of the server violates the protocol.
     Unexpected,
     /// The data of a block upload does not match its CRC.
     Crc,
-    /// The server sends more than there is room for.
+    /// The server sends more data than the sink has room for.
     TooLong,
     /// The transfer took longer than [`Options::limit`](super::Options::limit).
     Late,
-    /// This side has given up ([`Transfer::abort`](super::Transfer::abort)).
+    /// The client has cancelled the transfer ([`Transfer::abort`](super::Transfer::abort)).
     Cancelled,
 }
 
-/// CiA 301 has the code, and no server of this crate needs it.
+/// CiA 301, 7.2.4.3.17. `Abort` lacks this code because no server of this crate sends it.
 const OUT_OF_MEMORY: AbortCode = AbortCode(0x0504_0005);
 
 impl Error {
-    /// Abort code that the client sends when it gives up; `None` where the server has ended the transfer itself.
+    /// Abort code that the client sends when it gives up; `None` when the server has ended the transfer.
     #[must_use]
     pub fn abort(self) -> Option<AbortCode> {
         match self {
@@ -41,7 +41,7 @@ impl Error {
         }
     }
 
-    /// Whether another attempt may end better.
+    /// Whether another attempt may succeed.
     pub(super) fn is_worth_a_retry(self) -> bool {
         matches!(self, Error::NoAnswer | Error::Unexpected)
     }

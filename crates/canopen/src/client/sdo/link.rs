@@ -1,4 +1,4 @@
-//! The part of a transfer that all kinds share: the CAN-IDs, the frame to send next, and the time limit of the answer.
+//! The state that all kinds of transfer share: the CAN-IDs, the frame to send next, and the deadline of the answer.
 
 use super::{AbortCode, Error, Options};
 use crate::client::service::later;
@@ -9,7 +9,7 @@ use crate::{Duration, Frame, Instant, NodeId};
 const TO_SERVER: u16 = 0x600;
 const FROM_SERVER: u16 = 0x580;
 
-/// The way to a server.
+/// The connection to the server of one node.
 #[derive(Debug)]
 pub struct Link {
     node: NodeId,
@@ -18,14 +18,14 @@ pub struct Link {
     pub(super) options: Options,
     /// The frame to send next.
     outgoing: Option<[u8; 8]>,
-    /// The answer that is waited for is the first one of a transfer, and names its object.
+    /// The next answer is the first one of a transfer, and names the object of the transfer.
     is_first: bool,
-    /// How long the next answer may take.
+    /// The longest time until the next answer.
     patience: Duration,
     answer_by: Instant,
-    /// Something has come since the last request that did not fit.
-    has_unfit: bool,
-    /// The newest frame of the server. One that comes twice in a row counts once.
+    /// A frame that does not fit has arrived since the last request.
+    has_unexpected: bool,
+    /// The newest frame of the server. A frame that arrives twice in a row counts once.
     newest: Option<[u8; 8]>,
 }
 
@@ -39,7 +39,7 @@ impl Link {
             is_first: false,
             patience: options.timeout,
             answer_by: Instant::NEVER,
-            has_unfit: false,
+            has_unexpected: false,
             newest: None,
         }
     }
@@ -51,29 +51,29 @@ impl Link {
         self.is_first = true;
     }
 
-    /// Sends a request. The answer may take the usual time.
+    /// Sends a request. The answer is due within the usual time-out.
     pub(super) fn ask(&mut self, request: Request) {
         self.outgoing = Some(request.encode());
         self.is_first = false;
-        self.has_unfit = false;
+        self.has_unexpected = false;
         self.patience = self.options.timeout;
     }
 
-    /// Tells the server that the transfer is over. It has no answer.
+    /// Tells the server that the transfer is over. The server does not answer an abort message.
     pub(super) fn give_up(&mut self, code: AbortCode) {
         self.outgoing = Some(Request::Abort(self.at, code.0).encode());
     }
 
-    /// The frame to send next.
+    /// The frame to send next, if any. The time for the answer begins.
     pub(super) fn outgoing(&mut self, now: Instant) -> Option<Frame> {
         let data = self.outgoing.take()?;
         self.answer_by = later(now, self.patience);
         Some(self.frame(data))
     }
 
-    /// A frame to the server. From now on the answer may take the usual time.
+    /// A frame for a segment of a block. The answer is due within the usual time-out.
     pub(super) fn segment(&mut self, data: [u8; 8], now: Instant) -> Frame {
-        self.has_unfit = false;
+        self.has_unexpected = false;
         self.answer_by = later(now, self.options.timeout);
         self.frame(data)
     }
@@ -82,34 +82,36 @@ impl Link {
         Frame::data_frame(self.node.service(TO_SERVER), 8, data)
     }
 
-    /// The next frame of the server has to come within this time.
+    /// Sets the longest time until the next frame of the server.
     pub(super) fn wait(&mut self, patience: Duration, now: Instant) {
         self.answer_by = later(now, patience);
     }
 
-    /// By when the next frame of the server has to come.
+    /// The deadline of the next frame of the server.
     pub(super) fn answer_by(&self) -> Instant {
         self.answer_by
     }
 
-    /// The data of a frame from the server, if it can be an answer: everything that was to be sent has been.
+    /// The data of a frame from the server. A frame cannot be an answer while a request still waits to be sent.
     pub(super) fn response(&self, frame: &Frame) -> Option<[u8; 8]> {
         frame.full(self.node.service(FROM_SERVER)).copied().filter(|_| self.outgoing.is_none())
     }
 
-    /// Whether a frame is one more copy of the newest.
+    /// Whether a frame repeats the newest frame.
     pub(super) fn is_repeated(&mut self, data: [u8; 8]) -> bool {
         self.newest.replace(data) == Some(data)
     }
 
-    /// The next frame of the server may be equal to the newest without being a copy of it.
+    /// The next frame of the server may be equal to the newest one without being a repetition.
     pub(super) fn expect_equal(&mut self) {
         self.newest = None;
     }
 
-    /// The code of an abort message that is about this transfer. One for another object comes late; a server that does not
-    /// understand a request at all may leave the object 0, or that of the transfer before. Segments of a block have the same bits in their first byte, but
-    /// no sequence number of 0.
+    /// The code of an abort message that concerns this transfer. While the first answer is due, an abort message for
+    /// another object is late and ignored. But a server that does not understand a request may leave the object 0, or
+    /// name the object of the transfer before.
+    ///
+    /// The first byte of a block segment may look like an abort message; but no segment has the sequence number 0.
     pub(super) fn refusal(&self, data: [u8; 8]) -> Option<AbortCode> {
         let Some(Response::Abort(of, code)) = Response::parse(data).filter(|_| data[0] == 0x80) else {
             return None;
@@ -119,12 +121,12 @@ impl Link {
         is_ours.then_some(AbortCode(code))
     }
 
-    pub(super) fn note_unfit(&mut self) {
-        self.has_unfit = true;
+    pub(super) fn note_unexpected(&mut self) {
+        self.has_unexpected = true;
     }
 
-    /// Why there was no answer.
+    /// The error for an answer that did not arrive.
     pub(super) fn silence(&self) -> Error {
-        if self.has_unfit { Error::Unexpected } else { Error::NoAnswer }
+        if self.has_unexpected { Error::Unexpected } else { Error::NoAnswer }
     }
 }

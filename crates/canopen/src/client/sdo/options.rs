@@ -1,23 +1,23 @@
-//! How patient a client is.
+//! Time-outs, retries and block size of a client.
 
 use crate::Duration;
 use crate::sdo::BlockSize;
 
-/// How patient a client is, and how it asks for blocks.
+/// Time-outs, retries and block size of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// How long the server may take to answer a request.
+    /// The longest time until the server answers a request.
     pub timeout: Duration,
-    /// How long a transfer may take in all, whatever the server does.
+    /// The longest time of a transfer, including retries.
     pub limit: Duration,
-    /// How often a transfer that got no answer, or one that does not fit, is begun anew.
+    /// How often a transfer is begun anew when an answer is missing or does not fit.
     pub retries: u8,
-    /// Segments in a block of a block upload.
+    /// Segments in a block of a block upload, 1 to 127.
     pub block_size: BlockSize,
 }
 
 impl Default for Options {
-    /// One second for an answer, ten seconds in all, one retry, the largest blocks.
+    /// One second for an answer, ten seconds for the transfer, one retry, the largest blocks.
     fn default() -> Options {
         Options {
             timeout: Duration::from_millis(1_000),

@@ -1,18 +1,18 @@
-//! Where the bytes of an upload go.
+//! The destination of the bytes of an upload.
 
 use crate::copy::copy;
 
-/// Where the bytes of an upload go.
+/// The destination of the bytes of an upload.
 pub trait Sink {
-    /// A transfer begins, perhaps anew: what has come before is void. `size` is how many bytes the server announces,
-    /// where it does. `false` when there is no room for them.
+    /// A transfer begins, perhaps once more: discards all bytes so far. `size` is the number of bytes, if the server
+    /// announces it. `false` when there is no room for that many.
     fn begin(&mut self, size: Option<u32>) -> bool;
 
     /// Takes the next bytes. `false` when there is no room for them.
     fn append(&mut self, bytes: &[u8]) -> bool;
 }
 
-/// A sink of fixed size.
+/// A sink of fixed size in memory.
 #[derive(Debug)]
 pub struct Buffer<'a> {
     memory: &'a mut [u8],
@@ -20,7 +20,7 @@ pub struct Buffer<'a> {
 }
 
 impl<'a> Buffer<'a> {
-    /// Fills this memory from its begin.
+    /// A sink that fills `memory` from its beginning.
     #[must_use]
     pub fn new(memory: &'a mut [u8]) -> Buffer<'a> {
         Buffer { memory, len: 0 }

@@ -1,4 +1,4 @@
-//! The frame of every transfer: order of the steps, time-outs, retries, end.
+//! The part that all kinds of transfer have in common: order of the steps, time-outs, retries, end.
 
 use super::link::Link;
 use super::{Error, Options};
@@ -7,23 +7,23 @@ use crate::client::{Service, Step, Taken};
 use crate::sdo::Multiplexer;
 use crate::{Frame, Instant, NodeId};
 
-/// One kind of transfer: what it sends, and what it makes of the answers.
+/// One kind of transfer: its requests, and its reaction to the answers.
 pub trait Protocol {
-    /// Begins, perhaps anew.
+    /// Begins the transfer, perhaps once more.
     fn begin(&mut self, link: &mut Link);
 
-    /// Takes a frame of the server that is no abort message.
+    /// Takes a frame of the server that is not an abort message.
     ///
     /// # Errors
     /// The transfer has failed.
     fn on_response(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error>;
 
-    /// The next segment of a block; `None` where there is none to be sent.
+    /// The next segment of a block; `None` when there is none to send.
     fn segment(&mut self, _: &mut Link) -> Option<[u8; 8]> {
         None
     }
 
-    /// The frame that is waited for has not come in time.
+    /// The next frame of the server has not arrived in time.
     ///
     /// # Errors
     /// The transfer has failed.
@@ -31,28 +31,28 @@ pub trait Protocol {
         Err(link.silence())
     }
 
-    /// Bytes that have arrived at the other side.
+    /// Bytes that the receiver has taken.
     fn transferred(&self) -> usize;
 }
 
-/// Meaning of an answer for the transfer.
+/// The effect of an answer on the transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// The transfer goes on.
-    Goes,
-    /// The transfer is complete, but for what is still to be sent.
+    Continues,
+    /// The transfer is complete; one last frame may remain to be sent.
     Complete,
-    /// The answer does not fit.
-    Unfit,
+    /// The answer does not fit the state of the transfer.
+    Unexpected,
 }
 
-/// Where the transfer is.
+/// The state of the transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Nothing has been sent.
     New,
     Running,
-    /// The server is told that this attempt is over; then comes another.
+    /// The server is told that this attempt is over; then the next attempt begins.
     Again,
     Over(Result<(), Error>),
 }
@@ -66,7 +66,7 @@ pub struct Transfer<P> {
     pub(super) protocol: P,
     link: Link,
     phase: Phase,
-    /// By then it is over, one way or the other.
+    /// The deadline of the whole transfer.
     end: Instant,
     retries: u8,
 }
@@ -78,13 +78,13 @@ impl<P: Protocol> Transfer<P> {
         Transfer { protocol, link, phase: Phase::New, end: Instant::NEVER, retries }
     }
 
-    /// How many bytes have arrived at the other side so far. A transfer that is begun anew counts from 0 again.
+    /// How many bytes the receiver has taken so far. A transfer that is begun anew counts from 0 again.
     #[must_use]
     pub fn transferred(&self) -> usize {
         self.protocol.transferred()
     }
 
-    /// Gives the transfer up. The next step tells the server.
+    /// Cancels the transfer. The next step tells the server.
     pub fn abort(&mut self) {
         if !matches!(self.phase, Phase::Over(_)) {
             self.fail(Error::Cancelled);
@@ -108,7 +108,7 @@ impl<P: Protocol> Transfer<P> {
         };
     }
 
-    /// Begins where there is something to begin, and ends what has taken too long.
+    /// Begins a new transfer, and fails a transfer that has reached its deadline.
     fn advance(&mut self, now: Instant) {
         if self.phase == Phase::New {
             self.end = later(now, self.link.options.limit);
@@ -120,7 +120,7 @@ impl<P: Protocol> Transfer<P> {
         }
     }
 
-    /// Nothing has come for too long.
+    /// The answer of the server is late.
     fn on_silence(&mut self) {
         if let Err(error) = self.protocol.on_silence(&mut self.link) {
             self.fail(error);
@@ -133,7 +133,7 @@ impl<P: Protocol> Service for Transfer<P> {
 
     fn next(&mut self, now: Instant) -> Step<Result<(), Error>> {
         self.advance(now);
-        // Each pass ends here or has something to send: the second one at the latest.
+        // Ends after two passes at the latest: the second pass has a frame to send or a result.
         loop {
             if let Some(frame) = self.link.outgoing(now) {
                 return Step::Send(frame);
@@ -166,14 +166,14 @@ impl<P: Protocol> Service for Transfer<P> {
             return Taken::Used;
         }
         match self.protocol.on_response(data, &mut self.link, now) {
-            Ok(Progress::Goes) => Taken::Used,
+            Ok(Progress::Continues) => Taken::Used,
             Ok(Progress::Complete) => {
                 self.phase = Phase::Over(Ok(()));
                 Taken::Used
             }
-            Ok(Progress::Unfit) => {
-                self.link.note_unfit();
-                Taken::Unfit
+            Ok(Progress::Unexpected) => {
+                self.link.note_unexpected();
+                Taken::Unexpected
             }
             Err(error) => {
                 self.fail(error);

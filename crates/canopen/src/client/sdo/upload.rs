@@ -19,7 +19,7 @@ pub struct Protocol<S> {
 #[derive(Clone, Copy, Debug)]
 struct Segments {
     toggle: bool,
-    /// Bytes in all, where the server says so.
+    /// Total number of bytes, if the server announces it.
     size: Option<usize>,
 }
 
@@ -30,7 +30,7 @@ impl<S: Sink> Upload<S> {
         Transfer::with(Protocol::new(sink), node, at, options)
     }
 
-    /// The sink with what has come.
+    /// The sink with the received bytes.
     #[must_use]
     pub fn into_sink(self) -> S {
         self.protocol.into_sink()
@@ -50,12 +50,12 @@ impl<S: Sink> Protocol<S> {
         &mut self.sink
     }
 
-    /// Nothing has come yet.
+    /// Forgets the bytes received so far.
     pub(super) fn reset(&mut self) {
         (self.segments, self.received) = (None, 0);
     }
 
-    /// All of the data at once.
+    /// Takes the data of an expedited transfer.
     fn take_all(&mut self, bytes: &[u8]) -> Result<Progress, Error> {
         let fits = self.sink.begin(u32::try_from(bytes.len()).ok()) && self.sink.append(bytes);
         self.received = bytes.len();
@@ -69,13 +69,13 @@ impl<S: Sink> Protocol<S> {
         let size = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
         self.segments = Some(Segments { toggle: false, size });
         link.ask(Request::UploadSegment { toggle: false });
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 
-    /// A segment without data that is not the last would go on for ever.
+    /// Takes a segment. An empty segment that is not the last one is refused: the transfer might never end.
     fn take(&mut self, segment: &Segment, now: Segments, link: &mut Link) -> Result<Progress, Error> {
         if segment.toggle != now.toggle {
-            return Ok(Progress::Unfit);
+            return Ok(Progress::Unexpected);
         }
         self.received = self.received.saturating_add(segment.data.len().into());
         let is_too_much = now.size.is_some_and(|size| self.received > size);
@@ -92,7 +92,7 @@ impl<S: Sink> Protocol<S> {
         let toggle = !now.toggle;
         self.segments = Some(Segments { toggle, ..now });
         link.ask(Request::UploadSegment { toggle });
-        Ok(Progress::Goes)
+        Ok(Progress::Continues)
     }
 }
 
@@ -109,7 +109,7 @@ impl<S: Sink> transfer::Protocol for Protocol<S> {
                 self.begin_segments(size, link)
             }
             (Some(now), Some(Response::UploadedSegment(segment))) => self.take(&segment, now, link),
-            _ => Ok(Progress::Unfit),
+            _ => Ok(Progress::Unexpected),
         }
     }
 

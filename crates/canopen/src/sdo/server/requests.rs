@@ -1,4 +1,4 @@
-//! What the server does with each request.
+//! The reaction of the server to each request.
 
 use super::{Answer, Server, Transfer};
 use crate::Instant;
@@ -12,7 +12,7 @@ use crate::sdo::{
 };
 
 impl Server {
-    /// A request that is no segment of a block; `is_repeated` for the same as the one before.
+    /// Takes a request that is not a segment of a block. `is_repeated` is `true` if it is equal to the request before.
     #[inline]
     pub(super) fn dispatch<O: Objects>(
         &mut self,
@@ -22,14 +22,15 @@ impl Server {
         now: Instant,
     ) -> Answer {
         let Some(request) = Request::parse(frame) else {
-            // No transfer is under way: the abort names the object of this frame, and not that of the last transfer.
+            // Without a transfer, the abort message names the object of this frame instead of the last transfer's
+            // object.
             if self.is_idle() {
                 self.multiplexer = Multiplexer::parse(frame);
             }
             return Err(Abort::Command);
         };
         match request {
-            // `answer` hands these to functions of their own.
+            // `answer` handles these two.
             Request::Upload(_) | Request::Download(..) => Err(Abort::Command),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
             Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
@@ -50,11 +51,11 @@ impl Server {
             Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| false),
             Request::BlockAcknowledge { sequence, block_size } => {
                 match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
-                    Some(end) => Ok(self.say(Response::BlockUploadEnd(end))),
+                    Some(end) => Ok(self.set_reply(Response::BlockUploadEnd(end))),
                     None => Ok(false),
                 }
             }
-            // The confirmation of the end is not answered; one that was refused is refused again.
+            // A confirmation has no answer, so a repetition is ignored. A refused confirmation is refused again.
             Request::BlockUploadEnded if is_repeated && !self.is_answered => Ok(false),
             Request::BlockUploadEnded => {
                 self.sender()?.ended()?;
@@ -64,7 +65,7 @@ impl Server {
         }
     }
 
-    /// The request that begins a download.
+    /// Takes the request that begins a download.
     #[inline(never)]
     pub(super) fn initiate_download(
         &mut self,
@@ -74,16 +75,16 @@ impl Server {
     ) -> bool {
         let at = Multiplexer::parse(frame);
         self.begin(at);
-        // Most writes are of this kind: the data are taken straight from the frame.
+        // Most downloads are expedited: their data is used directly from the frame.
         let result = match Initiate::expedited(frame) {
             Some(data) => objects.write(at, data, now),
             None => self.download(at, frame, objects, now),
         };
-        let answer = result.map(|()| self.say(Response::Downloaded(at)));
+        let answer = result.map(|()| self.set_reply(Response::Downloaded(at)));
         self.conclude(answer, objects, now)
     }
 
-    /// The request that begins an upload.
+    /// Takes the request that begins an upload.
     #[inline(never)]
     pub(super) fn initiate_upload(
         &mut self,
@@ -95,7 +96,7 @@ impl Server {
         self.settle(answer, now)
     }
 
-    /// A new transfer; one that was under way is forgotten, as its client has started over.
+    /// Begins a transfer. A transfer that is under way is forgotten: its client has started over.
     fn begin(&mut self, at: Multiplexer) {
         self.transfer = Transfer::Idle;
         self.multiplexer = at;
@@ -106,11 +107,11 @@ impl Server {
         self.begin(at);
         let value = objects.read(at)?;
         if value.len() <= 4 {
-            return Ok(self.say(Response::Uploaded(at, Bytes::from_slice(value))));
+            return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(value))));
         }
         let source = Source::new(at, value, &mut self.buffer);
         self.transfer = Transfer::Upload(Upload::new(source));
-        Ok(self.say(Response::UploadSegmented(at, Some(source.size()))))
+        Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
     }
 
     fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
@@ -119,7 +120,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.say(Response::UploadedSegment(segment)))
+        Ok(self.set_reply(Response::UploadedSegment(segment)))
     }
 
     #[inline(never)]
@@ -147,7 +148,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.say(Response::DownloadedSegment { toggle: segment.toggle }))
+        Ok(self.set_reply(Response::DownloadedSegment { toggle: segment.toggle }))
     }
 
     fn block_download(
@@ -160,7 +161,7 @@ impl Server {
         self.begin(at);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
-        Ok(self.say(Response::BlockDownload(at, BlockSize::MAX)))
+        Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
     pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut impl Objects) -> Answer {
@@ -169,17 +170,17 @@ impl Server {
             return Ok(false);
         }
         let sequence = receiver.acknowledge();
-        Ok(self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
+        Ok(self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
     fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
-        Ok(self.say(Response::BlockDownloaded))
+        Ok(self.set_reply(Response::BlockDownloaded))
     }
 
-    /// A value of no more than `threshold` bytes goes by the simpler transfers.
+    /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
     fn block_upload(
         &mut self,
         at: Multiplexer,
@@ -194,7 +195,7 @@ impl Server {
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        Ok(self.say(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
+        Ok(self.set_reply(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {
@@ -205,7 +206,7 @@ impl Server {
     }
 }
 
-/// The value of an expedited download that leaves its size to the type.
+/// The value of an expedited download without a size. The size is taken from the data type.
 fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
     match objects.writable(at)? {
         Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),

@@ -1,5 +1,5 @@
-//! The filling of the run-time tables. What is in them already is not put there again: places of the same shape, equal
-//! attributes, and default values that follow each other somewhere as they are needed.
+//! Builds the run-time tables without duplicates: objects of the same shape share their places, entries share equal
+//! attributes, and a sequence of default values is stored once.
 #![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use super::compile::{effective_limits, event_timer, object_len, series_len};
@@ -8,40 +8,47 @@ use super::limits::Limits;
 use super::tables::{Place, Series};
 use super::{Counts, DefaultValue, Group, Object, Rule, image_size};
 
-/// Room for tables, and how much of it is filled.
-pub(super) struct Filling {
-    pub(super) series: [Series; MOST],
-    pub(super) places: [Place; MOST],
-    pub(super) attributes: [Attributes; MOST_ATTRIBUTES],
-    pub(super) defaults: [u8; MOST_DEFAULTS],
-    pub(super) filled: Counts,
+/// Tables of maximum size, and the number of used elements.
+pub(super) struct TableBuilder {
+    pub(super) series: [Series; MAX],
+    pub(super) places: [Place; MAX],
+    pub(super) attributes: [Attributes; MAX_ATTRIBUTES],
+    pub(super) defaults: [u8; MAX_DEFAULTS],
+    pub(super) used: Counts,
 }
 
-/// More series or places than these do not compile.
-const MOST: usize = 1024;
-/// As large as the largest image.
-const MOST_DEFAULTS: usize = 1 << 16;
-/// A place names its attributes in a byte.
-const MOST_ATTRIBUTES: usize = 256;
+/// The maximum number of series and of places. A larger table does not compile.
+const MAX: usize = 1024;
+/// The maximum number of default bytes: the size of the largest image.
+const MAX_DEFAULTS: usize = 1 << 16;
+/// The maximum number of attributes: a place refers to its attributes by one byte.
+const MAX_ATTRIBUTES: usize = 256;
 
-#[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges, and there is no room for more numbers.
-#[allow(clippy::large_stack_arrays)] // It is filled during compilation.
-impl Filling {
-    pub(super) const fn of(all: &[&[Object]]) -> Filling {
-        let mut filling = Filling {
-            series: [Series { index: 0, offset: 0, first: 0, defaults: 0, given: 0, objects: 0, entries: 0 };
-                MOST],
-            places: [Place { sub: 0, attributes: 0, offset: 0 }; MOST],
-            attributes: [attributes(&all[0][0]); MOST_ATTRIBUTES],
-            defaults: [0; MOST_DEFAULTS],
-            filled: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
+#[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
+#[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
+impl TableBuilder {
+    pub(super) const fn of(all: &[&[Object]]) -> TableBuilder {
+        let mut builder = TableBuilder {
+            series: [Series {
+                index: 0,
+                offset: 0,
+                first: 0,
+                defaults: 0,
+                defaults_len: 0,
+                objects: 0,
+                entries: 0,
+            }; MAX],
+            places: [Place { sub: 0, attributes: 0, offset: 0 }; MAX],
+            attributes: [attributes(&all[0][0]); MAX_ATTRIBUTES],
+            defaults: [0; MAX_DEFAULTS],
+            used: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
         };
         let mut i = 0;
         while i < all.len() {
-            filling.add(all[i]);
+            builder.add(all[i]);
             i += 1;
         }
-        filling
+        builder
     }
 
     const fn add(&mut self, rows: &[Object]) {
@@ -54,24 +61,26 @@ impl Filling {
         }
     }
 
-    /// Objects of so many entries among `all` rows, the first at this place in the image.
+    /// Adds a series. `rows` are the rows of its objects, `entries` the number of rows per object, `offset` the offset
+    /// of the first object in the image. `all` is the whole table, for the event timers that other entries refer to.
     const fn add_series(&mut self, all: &[Object], rows: &[Object], entries: usize, offset: u16) {
-        let given = self.write_defaults(rows);
-        self.series[self.filled.series] = Series {
+        let defaults_len = self.write_defaults(rows);
+        self.series[self.used.series] = Series {
             index: rows[0].index,
             offset,
             first: self.add_places(all, rows.split_at(entries).0, offset) as u16,
-            defaults: self.add_defaults(given) as u16,
-            given: given as u16,
+            defaults: self.add_defaults(defaults_len) as u16,
+            defaults_len: defaults_len as u16,
             objects: (rows.len() / entries) as u8,
             entries: entries as u8,
         };
-        self.filled.series += 1;
+        self.used.series += 1;
     }
 
-    /// The number of the first of them: where the same places have been before, or behind all others.
+    /// Adds the places of an object. Returns the number of the first one, which may be an equal sequence already
+    /// stored.
     const fn add_places(&mut self, all: &[Object], object: &[Object], start_of_object: u16) -> usize {
-        let (start, mut row, mut next) = (self.filled.places, 0, 0);
+        let (start, mut row, mut next) = (self.used.places, 0, 0);
         while row < object.len() {
             let attributes = self.add_attributes(attributes(&object[row])) as u8;
             let offset = match object[row].rule {
@@ -88,11 +97,11 @@ impl Filling {
         while !self.has_places(first, start, object.len()) {
             first += 1;
         }
-        self.filled.places = larger(start, first + object.len());
+        self.used.places = larger(start, first + object.len());
         first
     }
 
-    /// Whether the places from `first` on are those from `start` on.
+    /// Whether the `len` places from `first` on are equal to the places from `start` on.
     const fn has_places(&self, first: usize, start: usize, len: usize) -> bool {
         let mut i = 0;
         while i < len {
@@ -107,41 +116,42 @@ impl Filling {
 
     const fn add_attributes(&mut self, attributes: Attributes) -> usize {
         let mut number = 0;
-        while number < self.filled.attributes && !is_same(&self.attributes[number], &attributes) {
+        while number < self.used.attributes && !is_same(&self.attributes[number], &attributes) {
             number += 1;
         }
         self.attributes[number] = attributes;
-        self.filled.attributes = larger(self.filled.attributes, number + 1);
+        self.used.attributes = larger(self.used.attributes, number + 1);
         number
     }
 
-    /// Writes default values behind all others; gives their number without the zeros at the end.
+    /// Writes default values after all stored ones. Returns their number without the zeros at the end.
     const fn write_defaults(&mut self, rows: &[Object]) -> usize {
-        let (mut at, mut given, mut row) = (0, 0, 0);
+        let (mut at, mut defaults_len, mut row) = (0, 0, 0);
         while row < rows.len() {
             let mut i = 0;
             while i < rows[row].stored_size() {
                 let byte = default_byte(rows[row].default, i);
-                self.defaults[self.filled.defaults + at] = byte;
+                self.defaults[self.used.defaults + at] = byte;
                 (at, i) = (at + 1, i + 1);
-                given = if byte == 0 { given } else { at };
+                defaults_len = if byte == 0 { defaults_len } else { at };
             }
             row += 1;
         }
-        given
+        defaults_len
     }
 
-    /// The number of the first of those that have been written: where the same values have been before, or where they are.
-    const fn add_defaults(&mut self, given: usize) -> usize {
-        let (start, mut first) = (self.filled.defaults, 0);
-        while !self.has_defaults(first, start, given) {
+    /// Stores the `defaults_len` default values just written. Returns the number of the first one, which may be an
+    /// equal sequence already stored.
+    const fn add_defaults(&mut self, defaults_len: usize) -> usize {
+        let (start, mut first) = (self.used.defaults, 0);
+        while !self.has_defaults(first, start, defaults_len) {
             first += 1;
         }
-        self.filled.defaults = larger(start, first + given);
+        self.used.defaults = larger(start, first + defaults_len);
         first
     }
 
-    /// Whether the values from `first` on are those from `start` on.
+    /// Whether the `len` values from `first` on are equal to the values from `start` on.
     const fn has_defaults(&self, first: usize, start: usize, len: usize) -> bool {
         let mut i = 0;
         while i < len && self.defaults[first + i] == self.defaults[start + i] {
@@ -166,7 +176,7 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.node_relative == b.node_relative
 }
 
-/// A number for a group, as constant functions cannot compare groups.
+/// A number for each group: constant functions cannot compare groups.
 pub(super) const fn group_code(group: Option<Group>) -> u8 {
     match group {
         None => u8::MAX,
