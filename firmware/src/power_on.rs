@@ -29,7 +29,7 @@ fn battery_failed(cause: ResetCause, found: &Found) -> bool {
         Battery::Unknown => {}
         Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
         Battery::Lost => {
-            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new")
+            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new");
         }
     }
     battery == Battery::Lost

@@ -9,7 +9,7 @@ use crate::board::Board;
 use crate::flash;
 
 /// How often boards are looked at, in the host's time.
-const PERIOD: Duration = Duration::from_millis(1000);
+const PERIOD: Duration = Duration::from_secs(1);
 
 /// The directory of the files, and what is in them.
 pub(crate) struct Keeper {

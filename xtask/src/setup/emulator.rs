@@ -65,6 +65,7 @@ fn find() -> Option<Vec<(OsString, OsString)>> {
 }
 
 /// The search path on which cmake is found; `None` in it where the user's own path leads there.
+#[allow(clippy::option_option, reason = "a cmake may be there and need no path")]
 fn cmake(tools: &Path) -> Option<Option<(OsString, OsString)>> {
     if runs("cmake") {
         return Some(None);
