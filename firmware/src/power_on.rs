@@ -30,7 +30,7 @@ fn battery_failed(cause: ResetCause, backup: &BackupState) -> bool {
         Battery::Unknown => {}
         Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
         Battery::Lost => {
-            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new")
+            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new");
         }
     }
     battery == Battery::Lost

@@ -84,6 +84,7 @@ fn published() -> Result<Package> {
     metadata.packages.into_iter().find(|package| package.name == HAL).context("the firmware has no HAL")
 }
 
+#[allow(clippy::unnecessary_debug_formatting, reason = "TOML quotes a path as Rust does")]
 fn manifest(version: &str, source: &Path) -> Result<String> {
     let mut text =
         String::from("[package]\nname = \"hal-examples\"\nversion = \"0.0.0\"\nedition = \"2024\"\n");

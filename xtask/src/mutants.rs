@@ -2,14 +2,38 @@
 //!
 //! `.cargo/mutants.toml` tells which code is changed.
 
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
 use anyhow::Result;
 use clap::Args;
 
 use crate::command::{cargo, run, target_dir};
 use crate::tools;
 
-/// The crates that are mutated by default.
-const PACKAGES: [&str; 3] = ["profiles", "storage", "update"];
+/// A crate that is mutated.
+struct Mutated {
+    /// What the command calls it.
+    name: &'static str,
+    package: &'static str,
+    /// What cargo builds and runs for it, beside the package. No examples of the documentation: building them takes longer than
+    /// running all tests.
+    tests: &'static [&'static str],
+}
+
+const fn alone(name: &'static str, package: &'static str) -> Mutated {
+    Mutated { name, package, tests: &["--lib", "--tests"] }
+}
+
+const CRATES: [Mutated; 5] = [
+    alone("profiles", "profiles"),
+    alone("storage", "storage"),
+    alone("update", "update"),
+    alone("canopen", "canopen-device"),
+    // A node is what its crates make together.
+    Mutated { name: "node", package: "node", tests: &["--lib", "--package=host-tests", "--test=node"] },
+];
 
 /// The same inputs for every mutant, and no search for a smaller failing input.
 const PROPTEST: [(&str, &str); 2] = [("PROPTEST_RNG_SEED", "1"), ("PROPTEST_MAX_SHRINK_ITERS", "0")];
@@ -17,30 +41,36 @@ const PROPTEST: [(&str, &str); 2] = [("PROPTEST_RNG_SEED", "1"), ("PROPTEST_MAX_
 /// The flags of the command.
 #[derive(Args)]
 pub(crate) struct Flags {
-    /// The crates to mutate [default: profiles storage update]
-    packages: Vec<String>,
-    /// Run one of several parts: `0/8` is the first of eight
+    /// The crates to mutate [default: all of them]
+    #[arg(value_parser = CRATES.map(|of| of.name))]
+    crates: Vec<String>,
+    /// Run one of several parts of each crate: `0/8` is the first of eight
     #[arg(long, value_name = "PART/PARTS")]
     shard: Option<String>,
 }
 
-/// Prints the mutants that no test notices, and fails when there is one. The logs are in target/mutants.out.
+/// Prints the mutants that no test notices; the logs are in target/mutants. Fails when there is one.
 pub(crate) fn print(flags: &Flags) -> Result<()> {
-    let mut command = cargo();
-    command.args(["mutants", "--colors", "never", "--output"]).arg(target_dir());
-    for package in packages(flags) {
-        command.args(["--package", package]);
+    let path = tools::with("cargo-mutants")?;
+    let is_named = |of: &&Mutated| flags.crates.is_empty() || flags.crates.iter().any(|name| name == of.name);
+    let mut outcome = Ok(());
+    for of in CRATES.iter().filter(is_named) {
+        let logs = target_dir().join("mutants").join(of.name);
+        fs::create_dir_all(&logs)?;
+        // The other crates are tried all the same.
+        outcome = outcome.and(run(command(of, flags, &logs).env("PATH", &path)));
     }
+    outcome
+}
+
+fn command(of: &Mutated, flags: &Flags, logs: &Path) -> Command {
+    let mut command = cargo();
+    command.args(["mutants", "--colors", "never", "--output"]).arg(logs);
+    command.args(["--package", of.package]);
+    command.args(of.tests.iter().map(|argument| format!("--cargo-arg={argument}")));
     if let Some(shard) = &flags.shard {
         command.args(["--shard", shard]);
     }
-    run(command.env("PATH", tools::with("cargo-mutants")?).env("RUST_BACKTRACE", "0").envs(PROPTEST))
-}
-
-fn packages(flags: &Flags) -> Vec<&str> {
-    if flags.packages.is_empty() {
-        PACKAGES.to_vec()
-    } else {
-        flags.packages.iter().map(String::as_str).collect()
-    }
+    command.env("RUST_BACKTRACE", "0").envs(PROPTEST);
+    command
 }

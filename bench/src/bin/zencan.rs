@@ -17,7 +17,7 @@ use zencan_node::common::messages::{CanId, CanMessage};
 use zencan_node::common::sdo::AbortCode;
 use zencan_node::object_dict::{ObjectAccess, SubObjectAccess};
 
-#[allow(missing_docs, unreachable_pub, clippy::all)]
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic)]
 mod generated {
     zencan_node::include_modules!(NODE);
 }

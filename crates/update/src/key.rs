@@ -47,7 +47,7 @@ pub(crate) const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
     key
 }
 
-#[allow(clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
+#[allow(clippy::arithmetic_side_effects, clippy::panic, reason = "evaluated by the compiler")]
 const fn nibble(digit: u8) -> u8 {
     match digit {
         b'0'..=b'9' => digit - b'0',

@@ -43,7 +43,8 @@
         clippy::indexing_slicing,
         clippy::arithmetic_side_effects,
         clippy::unwrap_used,
-        clippy::expect_used
+        clippy::expect_used,
+        clippy::panic
     )
 )]
 

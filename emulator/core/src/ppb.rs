@@ -85,7 +85,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_1FB0 => {}
             0xE000_E008 => self.scb.actlr = value,
             0xE000_E010..=0xE000_E01C => {
-                self.systick.write(address - 0xE000_E010, value, self.now, self.cycle)
+                self.systick.write(address - 0xE000_E010, value, self.now, self.cycle);
             }
             0xE000_E100..=0xE000_E11C => self.nvic.enable((address - 0xE000_E100) / 4, value),
             0xE000_E180..=0xE000_E19C => self.nvic.disable((address - 0xE000_E180) / 4, value),

@@ -55,7 +55,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             SYS_WRITEC => self.print(argument, 1)?,
             SYS_WRITE0 => self.print(argument, self.length(argument)?)?,
             SYS_WRITE => {
-                self.print(self.word(argument.wrapping_add(4))?, self.word(argument.wrapping_add(8))?)?
+                self.print(self.word(argument.wrapping_add(4))?, self.word(argument.wrapping_add(8))?)?;
             }
             _ => return None,
         }

@@ -150,7 +150,7 @@ fn put(flash: &mut [u8], at: u32, bytes: &[u8]) {
 /// A flash in which an image waits to be copied over the good application, which has run. The record that says so was made for an
 /// image that was good: whoever can write the flash writes the record too.
 fn waiting(image: &[u8]) -> Result<Vec<u8>> {
-    let mut flash = downloaded()?.bytes().to_vec();
+    let mut flash = downloaded()?.bytes().clone();
     put(&mut flash, LAYOUT.staging().start(), image);
     Ok(flash)
 }
@@ -165,7 +165,7 @@ fn returning(image: &[u8]) -> Result<Vec<u8>> {
     let is_withdrawn = Trial::withdraw(&mut flash, &LAYOUT).is_ok();
     let decision = update::boot(&mut flash, &target(), Start::default());
     ensure!(is_withdrawn && decision == Decision::Revert, "the trial is lost: {decision:?}");
-    let mut flash = flash.bytes().to_vec();
+    let mut flash = flash.bytes().clone();
     put(&mut flash, LAYOUT.kept().start(), image);
     Ok(flash)
 }

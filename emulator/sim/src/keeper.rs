@@ -10,7 +10,7 @@ use crate::board::Board;
 use crate::flash;
 
 /// Period of the checks for changes, in the host's time.
-const PERIOD: Duration = Duration::from_millis(1000);
+const PERIOD: Duration = Duration::from_secs(1);
 
 /// The directory of the files, and the state of the files.
 pub(crate) struct Keeper {

@@ -94,7 +94,7 @@ impl Log {
             match decoder.decode() {
                 Ok(frame) => sink(level(&frame), frame.display_message().to_string()),
                 Err(DecodeError::Malformed) => {
-                    sink(LogLevel::Warn, "(a log frame that cannot be read)".into())
+                    sink(LogLevel::Warn, "(a log frame that cannot be read)".into());
                 }
                 Err(DecodeError::UnexpectedEof) => return,
             }

@@ -77,7 +77,7 @@ fn understand_each_other(segments: Segments, ppm: i64) -> bool {
         let [first, second] = &mut nodes;
         let mut both: [&mut dyn Controller; 2] = [first, second];
         bus.step(&mut both, begin + exact.bit() * 399, &mut |event| {
-            errors += u16::from(matches!(event, Event::Error { .. }))
+            errors += u16::from(matches!(event, Event::Error { .. }));
         });
     }
     let received = nodes.iter_mut().map(|node| std::iter::from_fn(|| node.receive()).count()).sum::<usize>();
@@ -89,7 +89,7 @@ fn measured(segments: Segments) -> i64 {
     let most = |sign: i64| {
         let (mut good, mut bad) = (0, 40_000);
         while bad - good > 10 {
-            let middle = (good + bad) / 2;
+            let middle = i64::midpoint(good, bad);
             if understand_each_other(segments, sign * middle) { good = middle } else { bad = middle }
         }
         good

@@ -72,7 +72,7 @@ fn abort_code(error: SdoClientError) -> u32 {
 #[tokio::test(start_paused = true)]
 async fn every_object_is_read_by_both_transfers() {
     let (_, mut client) = node();
-    for row in Personality::Pressure.rows().iter() {
+    for row in Personality::Pressure.rows() {
         let value = client.upload(row.index, row.sub).await;
         match value {
             Ok(value) => {
@@ -141,9 +141,9 @@ async fn nmt_commands_move_the_node_and_the_heartbeat_tells() {
     let (port, mut manager) = manager();
     for (number, expected) in [(1, NmtState::Operational), (2, NmtState::Stopped)] {
         if number == 1 {
-            manager.nmt_start(ID).await
+            manager.nmt_start(ID).await;
         } else {
-            manager.nmt_stop(0).await
+            manager.nmt_stop(0).await;
         }
         sleep(Duration::from_millis(1100)).await;
         let nodes = manager.node_list().await;

@@ -5,7 +5,7 @@ use nodectl::bus::Station;
 use zencan_node::Callbacks;
 use zencan_node::common::messages::{CanId, CanMessage};
 
-#[allow(missing_docs, unreachable_pub, clippy::all)]
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic)]
 mod generated {
     zencan_node::include_modules!(NODE);
 }

@@ -30,7 +30,7 @@ fn section<'a>(ini: &'a Ini, index: u16, name: &str) -> Option<Section<'a>> {
 }
 
 /// The numbered lines of a section.
-fn lines<'a>(section: Option<Section<'a>>) -> impl Iterator<Item = (u8, &'a str)> {
+fn lines(section: Option<Section<'_>>) -> impl Iterator<Item = (u8, &str)> {
     section.into_iter().flat_map(Section::keys).filter_map(|(key, text)| Some((key.parse().ok()?, text)))
 }
 

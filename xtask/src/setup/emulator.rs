@@ -65,6 +65,7 @@ fn find() -> Option<Vec<(OsString, OsString)>> {
 }
 
 /// The variable with the search path to cmake; `Some(None)` where the user's own path leads to cmake.
+#[allow(clippy::option_option, reason = "a cmake may be there and need no path")]
 fn cmake(tools: &Path) -> Option<Option<(OsString, OsString)>> {
     if runs("cmake") {
         return Some(None);

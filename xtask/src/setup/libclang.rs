@@ -30,7 +30,11 @@ pub(crate) fn probe() -> Result<()> {
     let unit = parser.arguments(&arguments).unsaved(&[Unsaved::new("probe.h", HEADER)]).parse()?;
     let mut wrong = unit.get_diagnostics();
     wrong.retain(|diagnostic| diagnostic.get_severity() >= Severity::Error);
-    ensure!(wrong.is_empty(), "{}", wrong.first().map(|first| first.get_text()).unwrap_or_default());
+    ensure!(
+        wrong.is_empty(),
+        "{}",
+        wrong.first().map(clang::diagnostic::Diagnostic::get_text).unwrap_or_default()
+    );
     Ok(())
 }
 

@@ -35,7 +35,7 @@ pub fn log(crash: &Crash) {
         }
         Crash::Clock => defmt::error!("the last run ended when the clock on OSC_IN failed"),
         Crash::Interrupt(number) => {
-            defmt::error!("the last run ended in interrupt {=i16}, which nobody serves", number)
+            defmt::error!("the last run ended in interrupt {=i16}, which nobody serves", number);
         }
     }
 }

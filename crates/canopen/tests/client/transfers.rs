@@ -86,7 +86,7 @@ fn an_answer_that_is_lost_or_doubled_does_no_harm() {
     for copies in [0, 2] {
         for at in 0..20 {
             let faulty = || Faulty { server: Server::new(&data), copies, at, count: 0 };
-            let retries = if copies == 0 { 1 } else { 0 };
+            let retries = u8::from(copies == 0);
             let options = Options { retries, block_size: BlockSize::new(5).unwrap(), ..once() };
             let context = format!("{copies} copies of {at}");
             let (outcome, read, _) = upload(&mut faulty(), options);

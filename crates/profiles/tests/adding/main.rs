@@ -4,7 +4,7 @@ mod switches;
 
 use canopen::ErrorClass;
 use canopen::dictionary::Group;
-use profiles::board::{Inputs, PowerOn, RawEncoder, RawSample, Retained};
+use profiles::board::{Inputs, PositionInputs, PowerOn, RawEncoder, RawSample, Retained};
 use profiles::{encoder, personalities};
 
 personalities! {
@@ -112,5 +112,5 @@ fn another_personality_is_left_alone() {
     node.profile.publish(&Snapshot::Encoder(encoder::Snapshot::default()), &mut node.image);
     assert_eq!(node.image, before);
     assert_eq!(node.measurement.retained(), Retained::Nothing);
-    assert_eq!(node.profile.parameters(&node.image).position_inputs(), Default::default());
+    assert_eq!(node.profile.parameters(&node.image).position_inputs(), PositionInputs::default());
 }

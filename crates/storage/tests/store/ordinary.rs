@@ -174,7 +174,7 @@ impl NorFlash for Worn {
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
-        let stuck = if offset == self.at { 0x01 } else { 0x00 };
+        let stuck = u8::from(offset == self.at);
         let bytes: Vec<u8> = bytes.iter().map(|byte| byte | stuck).collect();
         self.flash.write(offset, &bytes)
     }

@@ -1,6 +1,8 @@
 //! Operating modes, test modes, bit timing, errors and bus-off.
 
-use canbus::{Attachment, BitTiming, Controller, Fault, HostNode, Position, SeenBy, Time, frame_bits};
+use canbus::{
+    Attachment, BitTiming, Controller, Fault, Faults, HostNode, Position, SeenBy, Time, frame_bits,
+};
 use chip::can::BxCan;
 
 use crate::rig::*;
@@ -209,7 +211,7 @@ fn bus_off_without_abom_waits_for_software() {
     assert_eq!(rig.read(0, ESR) & 4, 4);
     rig.run(BIT);
     assert_eq!(rig.read(0, ESR) & 4, 0);
-    rig.bus.faults = Default::default();
+    rig.bus.faults = Faults::default();
     rig.request(0, 0, &standard(0x100, &[]));
     rig.run(Time::from_millis(1));
     assert!(rig.hosts[0].receive().is_some());

@@ -28,7 +28,12 @@ impl Screen {
     pub(super) fn open(greeting: &[String]) -> io::Result<Screen> {
         let view = View::new(greeting);
         let now = Instant::now();
-        Ok(Screen { terminal: ratatui::try_init()?, view, drawn: now - REFRESH, averaged: now })
+        Ok(Screen {
+            terminal: ratatui::try_init()?,
+            view,
+            drawn: now.checked_sub(REFRESH).unwrap_or(now),
+            averaged: now,
+        })
     }
 
     pub(super) fn log(&mut self, line: String) {

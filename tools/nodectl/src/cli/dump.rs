@@ -88,6 +88,7 @@ struct Done {
     saved: bool,
 }
 
+#[allow(clippy::ref_option, reason = "as serde calls it")]
 fn or_null<S: Serializer>(value: &Option<Value>, serializer: S) -> Result<S::Ok, S::Error> {
     value.serialize(serializer)
 }

@@ -101,7 +101,7 @@ fn a_server_without_blocks_refuses_by_protocol() {
     let mut network = wire.network();
     let error =
         client(&mut network, 3).block_download(at(PROGRAM.0, PROGRAM.1), &value(100), |_| ()).unwrap_err();
-    assert!(error.abort().is_some_and(|code| code.is_protocol()), "{error}");
+    assert!(error.abort().is_some_and(nodectl::sdo::AbortCode::is_protocol), "{error}");
 }
 
 #[test]

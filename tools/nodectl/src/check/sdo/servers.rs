@@ -31,7 +31,7 @@ fn present_or_absent(s: &mut Subject<'_>) -> Outcome {
     for index in 0x1201..=0x127F {
         match s.try_read(index, 1)? {
             Ok(bytes) => {
-                ensure(bytes.len() == 4, format!("four bytes in {index:04X}h:1"), format!("{bytes:02X?}"))?
+                ensure(bytes.len() == 4, format!("four bytes in {index:04X}h:1"), format!("{bytes:02X?}"))?;
             }
             Err(Refusal(abort::NO_OBJECT)) => (),
             Err(refusal) => {

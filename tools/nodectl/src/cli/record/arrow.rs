@@ -95,10 +95,10 @@ impl Column {
         let integer = |value: &Value| if let Value::Integer(number) = value { Some(*number) } else { None };
         match self {
             Column::Signed(to) => {
-                to.append_option(value.and_then(integer).and_then(|value| value.try_into().ok()))
+                to.append_option(value.and_then(integer).and_then(|value| value.try_into().ok()));
             }
             Column::Unsigned(to) => {
-                to.append_option(value.and_then(integer).and_then(|value| value.try_into().ok()))
+                to.append_option(value.and_then(integer).and_then(|value| value.try_into().ok()));
             }
             Column::Number(to) => to.append_option(value.and_then(Value::as_f64)),
             Column::Text(to) => to.append_option(value.map(ToString::to_string)),

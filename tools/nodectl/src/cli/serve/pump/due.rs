@@ -72,7 +72,10 @@ impl Pump {
     pub(super) fn poll(&mut self) {
         for node in self.live.wanted_nodes() {
             let is_free = !self.schedule.has(Lane::Node(node));
-            if !is_free || self.bus.is_err() || !self.nodes.get(node).is_some_and(|node| node.is_alive()) {
+            if !is_free
+                || self.bus.is_err()
+                || !self.nodes.get(node).is_some_and(super::super::nodes::Node::is_alive)
+            {
                 continue;
             }
             if self.live.survey(node).is_none() {
