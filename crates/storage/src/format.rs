@@ -85,7 +85,7 @@ pub(crate) fn guarded(value: u16) -> u32 {
     u32::from(value) | u32::from(!value) << 16
 }
 
-/// GroupNumber of bits in [`Contents`] for the number of words: enough for four values of [`crate::MAX_VALUE`].
+/// Number of bits in [`Contents`] for the number of words: enough for four values of [`crate::MAX_VALUE`].
 const WORDS: u32 = 12;
 
 /// Head of a transaction: the number of words of its records, and the groups of the records.

@@ -24,7 +24,7 @@ impl<const ERASE: usize, const WORD: usize> MockFlash<ERASE, WORD> {
         MockFlash { cells: Cells::with_words(size, WORD, seed), erases: vec![0; size / ERASE] }
     }
 
-    /// GroupNumber of erases of each erase unit.
+    /// Number of erases of each erase unit.
     #[must_use]
     pub fn erases(&self) -> &[u32] {
         &self.erases

@@ -59,7 +59,7 @@ pub(crate) enum First {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scan {
     pub(crate) page: Page,
-    /// GroupNumber of this use of a page, counted over both pages; `None` if the page has no complete transaction.
+    /// Number of this use of a page, counted over both pages; `None` if the page has no complete transaction.
     pub(crate) generation: Option<u16>,
     pub(crate) first: First,
     /// The store has moved on to the other page.

@@ -12,7 +12,7 @@ use crate::board::{POSITION_RECORD_WORDS, RETAINED_WORDS, Retained};
 
 /// Milliseconds in a tenth of an hour.
 const TENTH: u32 = 360_000;
-/// Last value of 6508h: one more (FFFF FFFFh) would mean that the operating time is not available.
+/// Last value of 6508h: one more (`FFFF FFFFh`) would mean that the operating time is not available.
 const LAST: u32 = u32::MAX - 1;
 
 /// The operating time of the encoder: object 6508h.

@@ -23,7 +23,7 @@ fn changes(sizes: &Sizes, number: usize) -> Changes {
     sizes.iter().map(|&(group, len)| set(group, number as u16, len)).collect()
 }
 
-/// GroupNumber of saves that fit between two starts, if both pages are empty at the first.
+/// Number of saves that fit between two starts, if both pages are empty at the first.
 fn saves_without_restart(sizes: &Sizes) -> usize {
     let mut flash = blank();
     let mut store = start(&mut flash, PAGES).unwrap();
