@@ -100,7 +100,7 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
-    /// Install the needs of the other commands: compilers, cmake, libclang, Python packages, tshark, a browser
+    /// Install what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
         #[arg(long)]
