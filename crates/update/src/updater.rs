@@ -176,7 +176,7 @@ impl<F: Flash> Updater<F> {
     /// Ends the download: the image is checked, and committed if it is valid.
     ///
     /// # Errors
-    /// Those of [`Updater::receive`].
+    /// The errors of [`Updater::receive`].
     pub fn finish(&mut self) -> Result<(), Refusal> {
         let State::Receiving(receiver) = &mut self.state else {
             return Err(Refusal::Unspecified);

@@ -12,9 +12,9 @@ pub(crate) const BUFFER: usize = 112;
 /// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Writable {
-    /// As one value of at most this many bytes.
+    /// The entry takes one value of at most this many bytes.
     Value(usize),
-    /// In parts: a domain.
+    /// The entry is a domain and takes its content in parts.
     Stream,
 }
 

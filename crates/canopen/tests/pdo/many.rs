@@ -1,4 +1,4 @@
-//! As many PDOs and heartbeats as CiA 301 allows: 512 in each direction, and 127.
+//! The most PDOs and heartbeats that CiA 301 allows: 512 PDOs in each direction, and 127 heartbeats.
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Tables, Type};
 use canopen::{Device, Duration, Fault, Frame, Instant, NodeId};

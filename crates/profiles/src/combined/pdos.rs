@@ -8,7 +8,7 @@ use canopen::dictionary::DefaultValue;
 /// Pressure and temperature.
 const PROCESS_VALUES: &[i64] = &[0x6930_0120, 0x6930_0220];
 
-/// As TPDO 1 of a stand-alone transmitter.
+/// The pressure TPDO, set like TPDO 1 of a stand-alone transmitter.
 const PRESSURE_BY_EVENT: Tpdo = Tpdo {
     number: 2,
     cob_id: DefaultValue::NodeId(0x380),

@@ -175,8 +175,8 @@ impl PositionRecord {
     }
 
     /// Whether the record should be stored now, when the parameter store holds `stored` and the run began with `start`.
-    /// It is stored at once when a sensor starts or ceases to need retained memory, else once an hour, and more rarely
-    /// in a long run.
+    /// The record is stored at once when a sensor starts or ceases to need retained memory, else once an hour, and more
+    /// rarely in a long run.
     #[must_use]
     pub fn is_due(self, stored: PositionRecord, start: PositionRecord) -> bool {
         let run = self.tenths.saturating_sub(start.tenths);

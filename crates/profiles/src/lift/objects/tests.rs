@@ -366,7 +366,7 @@ fn a_button_that_is_not_used_says_nothing() {
     assert_eq!(node.call(), None, "switched off by its parameter");
 }
 
-/// As delivered, and with virtual devices other than panels.
+/// A node as delivered, and one with virtual devices other than panels.
 #[test]
 fn a_node_that_is_no_panel_has_no_calls_and_no_lamps() {
     for devices in [0, 3] {
