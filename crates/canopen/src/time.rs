@@ -27,8 +27,8 @@ impl Duration {
     }
 }
 
-/// Microseconds since start-up. 64 bits do not overflow in the life of a machine. Do not add to
-/// [`NEVER`](Instant::NEVER): the sum is meaningless.
+/// Microseconds since start-up. 64 bits do not overflow in the life of a machine. A sum beyond
+/// [`NEVER`](Instant::NEVER) is `NEVER`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(pub u64);
@@ -41,6 +41,6 @@ impl Instant {
 impl Add<Duration> for Instant {
     type Output = Instant;
     fn add(self, span: Duration) -> Instant {
-        Instant(self.0.wrapping_add(span.0))
+        Instant(self.0.saturating_add(span.0))
     }
 }

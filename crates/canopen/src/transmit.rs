@@ -1,5 +1,6 @@
 //! The transmit queue of the driver as the protocols use it.
 
+use crate::pdo::Budget;
 use crate::{Duration, Frame, Instant};
 
 /// The queue has no room. The sender keeps the frame and tries again.
@@ -53,6 +54,8 @@ pub struct Context<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
+    /// The share of process data in the bus. Services have none, and are not limited.
+    pub(crate) budget: Option<&'a mut Budget>,
 }
 
 impl<T: Transmit> Context<'_, T> {
@@ -69,6 +72,34 @@ impl<T: Transmit> Context<'_, T> {
     /// Queues a frame that a newer frame may replace. `false` when there is no room.
     pub(crate) fn send_state(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send_state(frame).is_ok()
+    }
+
+    /// Queues a PDO whose waiting predecessor the new one may replace. `false` when the queue has no room, or the
+    /// process data have taken their share of the bus.
+    pub(crate) fn send_value(&mut self, frame: Frame) -> bool {
+        self.admits(&frame) && self.send_state(frame) && self.spend(&frame)
+    }
+
+    /// Queues a multiplexed PDO. `false` as for [`send_value`](Self::send_value).
+    pub(crate) fn send_multiplexed(&mut self, frame: Frame) -> bool {
+        self.admits(&frame) && self.send(frame) && self.spend(&frame)
+    }
+
+    /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it.
+    pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
+        self.send(frame) && self.spend(&frame)
+    }
+
+    fn admits(&mut self, frame: &Frame) -> bool {
+        let now = self.now;
+        self.budget.as_mut().is_none_or(|budget| budget.admits(frame.id(), frame.len(), now))
+    }
+
+    fn spend(&mut self, frame: &Frame) -> bool {
+        if let Some(budget) = &mut self.budget {
+            budget.spend(frame.len());
+        }
+        true
     }
 
     /// How many frames `send` would take now.

@@ -5,6 +5,7 @@ use super::lss::LssSlave;
 use super::{Application as _, Next, Node, STALE};
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
+use crate::pdo::Budget;
 use crate::sdo::{Abort, Server};
 use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
@@ -26,6 +27,8 @@ pub(super) struct Services {
     /// When to continue a block that found the queue full.
     block_due: Instant,
     lss: LssSlave,
+    /// The share of process data in the bus.
+    budget: Budget,
 }
 
 impl Services {
@@ -36,11 +39,18 @@ impl Services {
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: LssSlave::new(node_id),
+            budget: Budget::new(BitRate::FASTEST.kbit()),
         }
     }
 
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
         self.lss.set_bit_rate(bit_rate);
+        self.set_bus_bit_rate(bit_rate);
+    }
+
+    /// Sets the bit rate at which the bus runs.
+    pub(super) fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.budget.set_bit_rate(bit_rate.kbit());
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.
@@ -59,7 +69,16 @@ impl Services {
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
     pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching() }
+        Context { now, out, is_open: !self.lss.is_switching(), budget: None }
+    }
+
+    /// The same for process data, which have a share of the bus.
+    pub(super) fn process_context<'a, Q: Transmit>(
+        &'a mut self,
+        now: Instant,
+        out: &'a mut Q,
+    ) -> Context<'a, Q> {
+        Context { now, out, is_open: !self.lss.is_switching(), budget: Some(&mut self.budget) }
     }
 }
 
@@ -191,7 +210,9 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.services.lss.poll_switching(now, &mut self.body);
+        if let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.body) {
+            self.services.set_bus_bit_rate(bit_rate);
+        }
         let context = &mut self.services.context(now, out);
         self.services.lss.poll(context);
         let basic = self.body.basic_mut();

@@ -2,8 +2,9 @@
 
 use super::basic::Basic;
 use super::body::Body;
+use super::full::Full;
 use super::pdos::low_half;
-use super::{Action, Application, Device, Job, Next, Node, STALE};
+use super::{Action, Application, Job, Next, Node, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
 use crate::transmit::Context;
@@ -124,7 +125,7 @@ impl Pending {
 
 impl<B: Body> Node<B> {
     /// Initialises the scope of the last reset (the first time, everything) and boots up. If 1F80h asks for it, a
-    /// [`Device`] starts by itself with the next [`publish`](Device::publish). A node-ID that LSS has configured is
+    /// [`Device`](super::Device) starts by itself with the next [`publish`](super::Device::publish). A node-ID that LSS has configured is
     /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let node_id = self.services.restart();
@@ -218,15 +219,15 @@ impl<A: Application> Basic<A, [u8]> {
 }
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
     pub(super) fn self_start(&mut self, context: &mut Context<'_, impl Transmit>) {
-        let Some(state) = self.body.basic.pending.self_start_state.take() else { return };
-        if self.body.emcy.register() == 0 {
-            self.body.enter(state);
-            self.body.send_process(context);
+        let Some(state) = self.basic.pending.self_start_state.take() else { return };
+        if self.emcy.register() == 0 {
+            self.enter(state);
+            self.send_process(context);
         }
     }
 }

@@ -113,6 +113,14 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
+    /// Triggers the transmission of selected objects that have never been sent.
+    pub(crate) fn send_new(&mut self) {
+        for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
+            watched.is_pending |= watched.sent.is_none();
+            self.is_pending |= watched.is_pending;
+        }
+    }
+
     /// Deselects the objects that a TPDO maps.
     pub(crate) fn deselect(&mut self, layout: &Layout) {
         for watched in &mut self.watched {
@@ -166,7 +174,7 @@ impl<const M: usize> Scanner<M> {
         if elapsed {
             self.send_all();
         }
-        if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
+        if settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
             self.event_due = context.now + Duration::from_millis(settings.event.into());
         }
         if !self.is_pending {
@@ -179,7 +187,7 @@ impl<const M: usize> Scanner<M> {
             let data = watched.value(image);
             // All these frames have the same identifier but different objects: no frame may replace another in the
             // queue.
-            if !context.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+            if !context.send_multiplexed(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
                 self.inhibited_until = context.now + RETRY;
                 return;
             }

@@ -109,11 +109,14 @@ impl Tpdo {
         }
     }
 
-    /// Takes new settings and discards the state of the old ones.
+    /// Takes new settings and discards the state of the old ones. The inhibit time of a valid TPDO continues.
     pub(crate) fn configure(&mut self, settings: Option<Settings>) {
+        let is_same = self.is_valid && settings.is_some_and(|new| new.id == self.settings.id);
+        let inhibited_until = if is_same { self.inhibited_until } else { Instant(0) };
         self.is_valid = settings.is_some();
         self.settings = settings.unwrap_or(Settings::UNUSED);
         self.stop();
+        self.inhibited_until = inhibited_until;
     }
 
     /// The settings of a valid TPDO.
@@ -128,7 +131,9 @@ impl Tpdo {
 
     /// Triggers the first transmission, on entering Operational or when the TPDO becomes valid in it.
     pub(crate) fn start(&mut self) {
+        let inhibited_until = self.inhibited_until;
         self.stop();
+        self.inhibited_until = inhibited_until;
         let events = self.events_of().is_some();
         self.pending = !events && self.is_valid && self.settings.transmission.is_event_driven();
         self.events = if events { Events::BEGIN } else { Events::NONE };
@@ -142,6 +147,7 @@ impl Tpdo {
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
     pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
         let settings = &self.settings;
+        let number = settings.events_of?;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
@@ -150,7 +156,7 @@ impl Tpdo {
             (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
             return None;
         }
-        settings.events_of.filter(|_| is_asked_now)
+        is_asked_now.then_some(number)
     }
 
     /// Handles the answer of the application. If `is_event`, the event is in the image.
@@ -234,6 +240,9 @@ impl Tpdo {
             }
             // Before the first event, there is nothing to send.
             _ if settings.events_of.is_some() && self.data.is_none() => (),
+            (Transmission::Timer | Transmission::Event, _) if context.now < self.inhibited_until => {
+                self.pending = true;
+            }
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
                 self.send(image, context);
             }
@@ -300,7 +309,7 @@ impl Tpdo {
         let data = layout.gather(image);
         let frame = Frame::data_frame(*id, layout.len(), data);
         let sends_events = self.settings.events_of.is_some();
-        let is_sent = if sends_events { context.send(frame) } else { context.send_state(frame) };
+        let is_sent = if sends_events { context.send_event(frame) } else { context.send_value(frame) };
         self.pending = !is_sent;
         if is_sent {
             self.data = Some(data);

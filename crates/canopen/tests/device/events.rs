@@ -150,3 +150,17 @@ fn the_application_switches_pdos() {
         assert_eq!(listens(&bench), on);
     }
 }
+
+/// A queue that is short for one moment must not make another event-driven TPDO due in the past (K21).
+#[test]
+fn a_short_queue_leaves_no_deadline_in_the_past_for_any_tpdo() {
+    for room in 0..=9 {
+        let mut bench = operational(255, 0, 0);
+        bench.out.room = room;
+        push(&mut bench, 1..=5);
+        bench.run(Duration::from_millis(20));
+        bench.out.room = usize::MAX;
+        bench.run(Duration::from_millis(20));
+        assert_eq!(told(&mut bench), [1, 2, 3, 4, 5], "room for {room}");
+    }
+}

@@ -232,3 +232,21 @@ fn the_application_leaves_out_what_is_not_there() {
     bench.set_value(1, &[0; 4]);
     assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]]);
 }
+
+/// The event timer runs on while nothing is selected (K22), and an object that is selected later is sent at once.
+#[test]
+fn deselected_objects_leave_no_deadline_in_the_past_and_are_sent_when_selected_again() {
+    for event in [0, 100] {
+        let mut bench = sender(DESTINATION);
+        bench.write(0x1800, 5, &[event, 0]).unwrap();
+        bench.nmt(1);
+        mpdos(&mut bench);
+        bench.device.application_mut().is_silent = true;
+        bench.write(0x6201, 0, &[1]).unwrap();
+        bench.run(Duration::from_millis(1000));
+        assert_eq!(mpdos(&mut bench), [[0; 8]; 0], "event timer {event} ms, nothing selected");
+        bench.device.application_mut().is_silent = false;
+        bench.write(0x6201, 0, &[2]).unwrap();
+        assert_eq!(mpdos(&mut bench).len(), 3, "event timer {event} ms, selected again");
+    }
+}

@@ -230,3 +230,31 @@ fn the_event_timer_has_a_second_name() {
     assert_eq!(bench.times_of(TPDO, Duration::from_millis(45)), [0, 20_000, 40_000]);
     assert_eq!(bench.write(0x6105, 0, &[1, 2, 3]), Err(0x0607_0012));
 }
+
+/// Writes to a valid TPDO and remote frames keep the inhibit time (P28).
+#[test]
+fn inhibit_time_continues_while_parameters_are_written_and_remote_frames_arrive() {
+    let acts: [(&str, fn(&mut Bench)); 4] = [
+        ("event timer", |bench| bench.write(0x1800, 5, &[0, 0]).unwrap()),
+        ("transmission type", |bench| bench.write(0x1800, 2, &[255]).unwrap()),
+        ("bit 30", |bench| {
+            let id = u32::from_le_bytes(bench.read(0x1800, 1).unwrap().try_into().unwrap());
+            bench.write32(0x1800, 1, id | 0x4000_0000).unwrap();
+        }),
+        ("remote frame", request),
+    ];
+    for (name, act) in acts {
+        let mut bench = bench(255, 5_000, 0);
+        bench.run(Duration::from_millis(600));
+        bench.set_value(1, &[1, 0, 0, 0]);
+        sent(&mut bench);
+        for count in 0..9 {
+            bench.run(Duration::from_millis(50));
+            act(&mut bench);
+            bench.set_value(1, &[count + 2, 0, 0, 0]);
+            assert_eq!(sent(&mut bench), [[0; 0]; 0], "{name} within the inhibit time");
+        }
+        bench.run(Duration::from_millis(60));
+        assert_eq!(sent(&mut bench).len(), 1, "{name}: the newest values at the end of the inhibit time");
+    }
+}
