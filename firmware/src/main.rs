@@ -214,7 +214,6 @@ mod app {
 
     #[task(binds = CAN1_TX, priority = 4, local = [transmitter], shared = [transmit])]
     fn transmit(mut cx: transmit::Context) {
-        cx.local.transmitter.acknowledge();
         cx.shared.transmit.lock(|queue| queue.pump(cx.local.transmitter));
     }
 

@@ -12,7 +12,7 @@ use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
-use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
+use node::{Action, BitRate, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -266,6 +266,9 @@ impl Services {
         };
         defmt::info!("on the bus at {=u16} kbit/s", timing.kbit());
         self.can.start(timing, &Banks::new());
+        if let Some(bit_rate) = BitRate::from_kbit(timing.kbit()) {
+            node.call(|protocol, _| protocol.set_bus_bit_rate(bit_rate));
+        }
         self.hand_over(node, false);
         self.filter(node);
         true

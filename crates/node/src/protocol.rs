@@ -1,5 +1,6 @@
 //! The protocol half: the CANopen device and its state.
 
+use canopen::lss::BitRate;
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::board::Outputs;
@@ -54,6 +55,11 @@ impl Protocol {
             self.job = Some(job);
         }
         next
+    }
+
+    /// Reports the bit rate at which the bus runs: process data take three quarters of it at most.
+    pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.device.set_bus_bit_rate(bit_rate);
     }
 
     /// The node-ID in use; `None` while the node waits for LSS to assign one.
