@@ -19,6 +19,7 @@ mod lost_events;
 mod measuring;
 mod oscillators;
 mod other_chips;
+mod own_load;
 mod position_faults;
 mod power_cycles;
 mod races;
