@@ -15,21 +15,41 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold about twenty frames: a block upload leaves room for ten others, on
-/// a [`ServiceDevice`](crate::ServiceDevice) for two.
+/// A transmit queue. It never blocks. It should hold about twenty frames: PDOs leave room for four other frames, events
+/// among them for twelve, a block upload for ten, on a [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
-    /// Queues one frame.
+    /// Queues one frame of a service.
     ///
     /// # Errors
     /// `QueueFull` when there is no room; the frame is then not queued.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull>;
 
-    /// Queues a frame with a present state: a heartbeat or a PDO. While the frame waits, a newer frame with the same
+    /// Queues a frame with a present state, such as a heartbeat. While the frame waits, a newer frame with the same
     /// identifier may replace it. A queue without this feature sends both.
     ///
     /// # Errors
     /// `QueueFull` when there is no room; the frame is then not queued.
     fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.send(frame)
+    }
+
+    /// Queues a PDO with present values, which a newer frame may replace as in [`send_state`](Transmit::send_state).
+    ///
+    /// The queue sees in this method and in [`send_event`](Transmit::send_event) which frames are PDOs. It can limit
+    /// their share of the bus, so that the heartbeat and the SDO responses are not late at any bit rate and with any
+    /// event timer.
+    ///
+    /// # Errors
+    /// `QueueFull` when there is no room; the frame is then not queued.
+    fn send_pdo(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.send_state(frame)
+    }
+
+    /// Queues a PDO with an event, or a multiplexed PDO. Each such frame is sent, in the order of its identifier.
+    ///
+    /// # Errors
+    /// `QueueFull` when there is no room; the frame is then not queued.
+    fn send_event(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.send(frame)
     }
 
@@ -71,11 +91,33 @@ impl<T: Transmit> Context<'_, T> {
         self.is_open && self.out.send_state(frame).is_ok()
     }
 
+    /// Queues a PDO with present values. `false` when there is no room beside the services.
+    pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
+        self.room() > ROOM_FOR_SERVICES && self.out.send_pdo(frame).is_ok()
+    }
+
+    /// Queues a PDO with an event. `false` when there is no room beside all others.
+    pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
+        self.has_room_for_event() && self.out.send_event(frame).is_ok()
+    }
+
+    /// Whether `send_event` would take a frame now.
+    pub(crate) fn has_room_for_event(&self) -> bool {
+        self.room() > ROOM_FOR_OTHERS
+    }
+
     /// How many frames `send` would take now.
     pub(crate) fn room(&self) -> usize {
         if self.is_open { self.out.room() } else { 0 }
     }
 }
+
+/// Free places that PDOs leave in the queue: for a heartbeat, an EMCY, an SDO response and an LSS response.
+const ROOM_FOR_SERVICES: usize = 4;
+
+/// Free places that events leave in the queue. The bus may be busy for minutes, but events can wait in the application.
+/// A block upload, which leaves fewer places, continues beside them.
+const ROOM_FOR_OTHERS: usize = 12;
 
 /// When to try again after `QueueFull`.
 pub(crate) const RETRY: Duration = Duration::from_millis(1);

@@ -35,8 +35,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if addressing == Some(Addressing::Destination) {
             self.select_watched();
         }
-        if is_new && self.basic.state.has_pdos() {
+        if !self.basic.state.has_pdos() {
+            return;
+        }
+        if is_new {
             self.scanner.start();
+        } else {
+            self.scanner.send_new();
         }
     }
 

@@ -166,5 +166,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         due = due.min(self.send_events(context));
         self.scanner.poll(&self.basic.image, context);
         self.basic.process_due = due.min(self.scanner.due()).min(self.sync.due());
+        debug_assert!(self.basic.process_due > context.now, "what is due does not stay due");
     }
 }
