@@ -16,8 +16,8 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold about twenty frames: a block upload leaves room for ten others, on
-/// a [`ServiceDevice`](crate::ServiceDevice) for two.
+/// A transmit queue. It never blocks. It should hold about twenty frames: PDOs leave room for four other frames, events
+/// among them for twelve, a block upload for ten, on a [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
     /// Queues one frame.
     ///
@@ -74,20 +74,26 @@ impl<T: Transmit> Context<'_, T> {
         self.is_open && self.out.send_state(frame).is_ok()
     }
 
-    /// Queues a PDO whose waiting predecessor the new one may replace. `false` when the queue has no room, or the
-    /// process data have taken their share of the bus.
-    pub(crate) fn send_value(&mut self, frame: Frame) -> bool {
-        self.admits(&frame) && self.send_state(frame) && self.spend(&frame)
+    /// Queues a PDO with present values, which a newer one may replace. `false` when there is no room beside the services,
+    /// or the process data have taken their share of the bus.
+    pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
+        self.room() > ROOM_FOR_SERVICES && self.admits(&frame) && self.send_state(frame) && self.spend(&frame)
     }
 
-    /// Queues a multiplexed PDO. `false` as for [`send_value`](Self::send_value).
+    /// Queues a multiplexed PDO. `false` when there is no room beside all others, or no share of the bus is left.
     pub(crate) fn send_multiplexed(&mut self, frame: Frame) -> bool {
-        self.admits(&frame) && self.send(frame) && self.spend(&frame)
+        self.has_room_for_event() && self.admits(&frame) && self.send(frame) && self.spend(&frame)
     }
 
-    /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it.
+    /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it. `false` when there is
+    /// no room beside all others.
     pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
-        self.send(frame) && self.spend(&frame)
+        self.has_room_for_event() && self.send(frame) && self.spend(&frame)
+    }
+
+    /// Whether `send_event` would take a frame now.
+    pub(crate) fn has_room_for_event(&self) -> bool {
+        self.room() > ROOM_FOR_OTHERS
     }
 
     fn admits(&mut self, frame: &Frame) -> bool {
@@ -107,6 +113,13 @@ impl<T: Transmit> Context<'_, T> {
         if self.is_open { self.out.room() } else { 0 }
     }
 }
+
+/// Free places that PDOs leave in the queue: for a heartbeat, an EMCY, an SDO response and an LSS response.
+const ROOM_FOR_SERVICES: usize = 4;
+
+/// Free places that events leave in the queue. The bus may be busy for minutes, but events can wait in the application.
+/// A block upload, which leaves fewer places, continues beside them.
+const ROOM_FOR_OTHERS: usize = 12;
 
 /// When to try again after `QueueFull`.
 pub(crate) const RETRY: Duration = Duration::from_millis(1);

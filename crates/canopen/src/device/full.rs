@@ -98,6 +98,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         } else {
             self.scanner.stop();
         }
+        if state == State::Initialising {
+            self.tpdos.iter_mut().for_each(Tpdo::reset);
+            self.scanner.reset();
+        }
         self.basic.process_due = STALE;
     }
 

@@ -226,10 +226,13 @@ impl<B: Body> Node<B> {
             self.poll_sdo(context);
         }
         self.body.basic_mut().services_due = self.next_service();
+        debug_assert!(self.body.basic().services_due > now, "what is due does not stay due");
     }
 
     fn poll_sdo(&mut self, context: &mut Context<'_, impl Transmit>) {
-        if context.now >= self.services.reply_due || self.services.server.expire(context.now) {
+        // Both are checked: the deadline of the transfer may have passed while a reply waited for room.
+        let is_expired = self.services.server.expire(context.now);
+        if is_expired || context.now >= self.services.reply_due {
             self.respond(context);
         }
         if B::Application::BLOCK_UPLOAD && context.now >= self.services.block_due {

@@ -50,8 +50,6 @@ pub(crate) struct Numbers {
     pub(crate) events: VecDeque<[u8; 4]>,
     /// An object that multiplexed TPDOs do not send to all nodes.
     pub(crate) not_told: Option<Multiplexer>,
-    /// No object is broadcast.
-    pub(crate) is_silent: bool,
 }
 
 impl Application for Numbers {
@@ -98,7 +96,7 @@ impl Application for Numbers {
     }
 
     fn broadcasts(&self, at: Multiplexer, _: &[u8]) -> bool {
-        !self.is_silent && self.not_told != Some(at)
+        self.not_told != Some(at)
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {

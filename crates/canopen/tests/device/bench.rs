@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use canopen::sdo::{Abort, Multiplexer, Request, Response};
+use canopen::testing::settle;
 use canopen::{
     Action, BusEvent, Device, Duration, ErrorClass, Frame, Instant, Next, NodeId, QueueFull, Transmit,
 };
@@ -99,15 +100,16 @@ impl Bench {
     }
 
     /// Keeps the result of a call. Waiting actions are returned by the next call.
-    fn follow(&mut self, next: Next) -> Instant {
-        self.parameters |= next.parameters;
-        match next.action {
-            Some(action) => {
-                self.actions.push_back(action);
-                self.poll()
-            }
-            None => next.due(),
+    fn follow(&mut self, next: Next) {
+        self.keep(next);
+        if next.action.is_some() {
+            self.poll();
         }
+    }
+
+    fn keep(&mut self, next: Next) {
+        self.parameters |= next.parameters;
+        self.actions.extend(next.action);
     }
 
     /// The next action that was left to the caller.
@@ -167,17 +169,14 @@ impl Bench {
         self.poll();
     }
 
-    /// Polls both halves until nothing is due. One half may give work to the other one, but a deadline that stays in the
-    /// past would wake the caller for ever.
+    /// Does all work that is due, and returns the next deadline.
     pub(crate) fn poll(&mut self) -> Instant {
-        for _ in 0..3 {
+        let next = settle(self.now, || {
             let next = self.device.poll(self.now, &mut self.out);
-            let due = self.follow(next);
-            if due > self.now {
-                return due;
-            }
-        }
-        panic!("work that is due at {:?} stays due", self.now);
+            self.keep(next);
+            next
+        });
+        next.due()
     }
 
     pub(crate) fn nmt(&mut self, command: u8) {

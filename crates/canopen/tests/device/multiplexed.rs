@@ -98,10 +98,10 @@ fn with_an_event_timer_the_timer_alone_sends() {
 #[test]
 fn a_full_queue_delays_and_leaving_operational_drops() {
     let mut bench = sender(DESTINATION);
-    bench.out.room = 1;
+    bench.out.room = 13;
     bench.nmt(1);
     assert_eq!(mpdos(&mut bench).len(), 1);
-    bench.out.room = 10;
+    bench.out.room = 20;
     bench.run(Duration::from_millis(2));
     assert_eq!(mpdos(&mut bench).len(), 2);
     bench.nmt(0x80);
@@ -233,20 +233,17 @@ fn the_application_leaves_out_what_is_not_there() {
     assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]]);
 }
 
-/// The event timer runs on while nothing is selected (K22), and an object that is selected later is sent at once.
 #[test]
-fn deselected_objects_leave_no_deadline_in_the_past_and_are_sent_when_selected_again() {
-    for event in [0, 100] {
-        let mut bench = sender(DESTINATION);
-        bench.write(0x1800, 5, &[event, 0]).unwrap();
-        bench.nmt(1);
-        mpdos(&mut bench);
-        bench.device.application_mut().is_silent = true;
-        bench.write(0x6201, 0, &[1]).unwrap();
-        bench.run(Duration::from_millis(1000));
-        assert_eq!(mpdos(&mut bench), [[0; 8]; 0], "event timer {event} ms, nothing selected");
-        bench.device.application_mut().is_silent = false;
-        bench.write(0x6201, 0, &[2]).unwrap();
-        assert_eq!(mpdos(&mut bench).len(), 3, "event timer {event} ms, selected again");
-    }
+fn reconfiguration_does_not_shorten_the_inhibit_time() {
+    let mut bench = sender(DESTINATION);
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 3, &5000_u16.to_le_bytes()).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 1);
+    bench.run(Duration::from_millis(100));
+    bench.write(0x1800, 5, &[100, 0]).unwrap();
+    bench.nmt(0x80);
+    bench.nmt(1);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(450)), [400_000]);
 }
