@@ -11,7 +11,8 @@ use crate::dictionary::{Entry, Group, Groups, Rule};
 use crate::emcy::Fault;
 use crate::lss::Configuration;
 use crate::sdo::Abort;
-use crate::{Instant, Transmit};
+use crate::nmt::State;
+use crate::{Duration, Instant, Transmit};
 
 /// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -101,6 +102,23 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let context = &mut self.services.context(now, out);
         self.finish_job(result, lss_waits, context);
         self.process_next()
+    }
+}
+
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
+    /// Whether nobody misses the device for `span`, for example while the erase of a flash page stops the core. The
+    /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
+    /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and no heartbeat of another node (1016h) is
+    /// due.
+    #[must_use]
+    pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
+        let basic = &self.body.basic;
+        matches!(basic.state, State::PreOperational | State::Stopped)
+            && self.services.is_between_requests()
+            && now + span <= basic.heartbeat.latest()
+            && now + span <= self.body.watches.due()
     }
 }
 
