@@ -268,7 +268,8 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Writes a transaction, then reads the pages again, so that the state in RAM always agrees with the flash.
+    /// Writes a transaction, then reads it again, so that the state in RAM always agrees with the flash. A page that comes
+    /// into use, and a page after an error, are read as a whole.
     fn write(
         &mut self,
         page: Page,
@@ -277,7 +278,11 @@ impl<F: NorFlash> Store<F> {
         records: &Records<'_>,
     ) -> Result<(), Error<F::Error>> {
         let written = Writer::new(&mut self.view.flash, page, at).transaction(generation, records);
-        self.view.refresh()?;
+        if written.is_ok() && page == self.current().page {
+            self.view.take_appended(at)?;
+        } else {
+            self.view.reread(page)?;
+        }
         written?;
         let Scan { page: current, end, tidy, .. } = *self.current();
         if current == page && end == at + size(records, page.format) && tidy {
@@ -292,7 +297,7 @@ impl<F: NorFlash> Store<F> {
         self.erases = self.erases.saturating_add(1);
         self.view.flash.erase(page.start, page.start + page.size)?;
         Writer::new(&mut self.view.flash, page, 0).program(CLEAN)?;
-        self.view.refresh()?;
+        self.view.reread(page)?;
         if self.is_clean(page) { Ok(()) } else { Err(Error::Corrupt) }
     }
 }

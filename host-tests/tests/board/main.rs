@@ -22,6 +22,7 @@ mod other_chips;
 mod position_faults;
 mod power_cycles;
 mod races;
+mod room;
 mod rules;
 mod running;
 mod saves;

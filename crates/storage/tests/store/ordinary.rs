@@ -127,6 +127,39 @@ fn saves_left_succeed_without_an_erase_with_device_records_between_them() {
     }
 }
 
+/// A save reads only its own transaction again.
+#[test]
+fn after_every_save_the_store_knows_what_a_start_would_read() {
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut flash = MockFlash::<1024, 4>::new(2048, 0);
+    let pages = Pages::new(0, 1024);
+    let mut model = EMPTY;
+    for round in 0..100_u16 {
+        let mut store = start(&mut flash, pages).unwrap();
+        for step in 0..random.u16(1..9) {
+            let group = *random.choice(GroupNumber::ALL.iter()).unwrap();
+            let change = if random.u8(..5) == 0 {
+                restore(group)
+            } else {
+                set(group, round * 16 + step, random.usize(..60))
+            };
+            let changes = vec![change];
+            if store.save(&as_changes(&changes)).is_ok() {
+                model = after(&model, &changes);
+            }
+            for (group, expected) in GroupNumber::ALL.into_iter().zip(&model) {
+                let mut buf = [0; 64];
+                let loaded = store.load(group, &mut buf).unwrap();
+                let found = loaded.map(|loaded| (loaded.version, buf[..loaded.len].to_vec()));
+                assert_eq!(found, *expected, "{group:?}");
+            }
+        }
+        let known = (store.saves_left(&[9; 4]), store.moves());
+        let fresh = Store::prepare_within(View::open(&mut flash, pages).unwrap(), 0).unwrap();
+        assert_eq!((fresh.saves_left(&[9; 4]), fresh.moves()), known);
+    }
+}
+
 #[test]
 fn a_start_without_erases_keeps_everything_and_room_is_made_later() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
