@@ -319,7 +319,7 @@ fn saves_and_resets_in_a_loop_cannot_wear_the_memory_out() {
     for personality in Personality::ALL {
         let mut master = Master::new(personality, 3);
         let new = master.board.chip.erases();
-        for _ in 0..3000 {
+        for _ in 0..1000 {
             let place = master.rng.usize(..master.all.len());
             if !master.store(place) || master.rng.u8(..3) == 0 {
                 master.restart(false);
@@ -340,7 +340,7 @@ fn saves_and_resets_in_a_loop_cannot_wear_the_memory_out() {
 fn a_value_written_between_two_requests_is_stored_when_the_second_is_answered() {
     for personality in Personality::ALL {
         for (first, second) in (0..4).flat_map(|first| (0..4).map(move |second| (first, second))) {
-            for distance in 0..12 {
+            for distance in [0, 1, 2, 3, 4, 6, 9] {
                 let mut master = Master::new(personality, 4);
                 if first.max(second) >= master.all.len() {
                     continue;
