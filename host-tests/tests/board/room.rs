@@ -123,11 +123,15 @@ fn an_operational_node_refuses_without_effect_and_loses_no_sample_and_pre_operat
         world.run_until(world.now() + Time::from_millis(100));
         for round in 0..2 {
             let mut saves = 0;
+            let left = read(&mut world, &master, SAVES_LEFT);
             while read(&mut world, &master, SAVES_LEFT) > 0 {
                 saves += 1;
                 assert_eq!(save_change(&mut world, &master, 1000 * round + saves).0, Ok(()), "{personality}");
             }
-            assert!(saves >= 4, "{personality}: {saves}");
+            println!(
+                "{personality}: {left} saves left by 2010h:1, {saves} saves of all groups in Operational"
+            );
+            assert!(left >= 2 && saves >= left, "{personality}: {saves}");
             assert_eq!(save_change(&mut world, &master, 77).0, Err(DEVICE_STATE), "{personality}");
             let erases = read(&mut world, &master, ERASES);
             if round == 0 {
@@ -159,6 +163,7 @@ fn a_preset_that_is_refused_does_not_move_the_position() {
         }
         last += 1000;
     }
+    println!("{} presets in Operational", last / 1000);
     assert!(last >= 30_000, "{last}");
     world.run_until(world.now() + Time::from_millis(20));
     assert_eq!(read(&mut world, &master, POSITION), last);

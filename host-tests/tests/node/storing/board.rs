@@ -70,14 +70,20 @@ impl Board {
         self.memory = None;
         (self.is_copied, self.is_pended, self.now) = (false, false, Instant(0));
         self.out.0.clear();
-        let mut view = View::open(self.chip.clone(), PAGES).expect("there is power");
-        self.protocol = Protocol::new(&self.setup);
-        let parameters = self.protocol.load(&mut view);
-        self.memory = ParameterMemory::prepare(view, budget).ok();
+        // A power cut during the start begins the start again.
+        while self.memory.is_none() {
+            if self.chip.is_down() {
+                self.chip.power_up();
+            }
+            let mut view = View::open(self.chip.clone(), PAGES).expect("there is power");
+            self.protocol = Protocol::new(&self.setup);
+            self.protocol.load(&mut view);
+            self.memory = ParameterMemory::prepare(view, budget).ok();
+        }
         self.show_memory();
         let power_on = PowerOn { retained, ..intact() };
         self.measurement = Measurement::new(self.setup.personality, &power_on);
-        self.measurement.apply(&parameters);
+        self.measurement.apply(&self.protocol.parameters());
         let next = self.protocol.start(self.now, &mut self.out);
         self.keep(next);
         self.run(5);

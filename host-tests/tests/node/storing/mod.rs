@@ -212,6 +212,7 @@ impl Master {
             None => return self.restart(true),
         }
         match self.rng.u8(..20) {
+            _ if self.board.chip.is_down() => return self.restart(true),
             0 => self.restart(false),
             1 => self.board.nmt(START),
             2..5 => self.board.nmt(PRE_OPERATIONAL),
