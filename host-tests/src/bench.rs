@@ -2,10 +2,14 @@
 
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use node::{BitRate, BusEvent, Fault, Identity, Measurement, Personality, Protocol, Setup, StoreJob};
+use embedded_storage::nor_flash::NorFlash;
+use node::{
+    BitRate, BusEvent, EraseBudget, Fault, Identity, Measurement, ParameterMemory, Personality, Protocol,
+    Setup, StoreJob,
+};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
-use storage::{DeviceRecord, Memory, Pages, Store, View};
+use storage::{DeviceRecord, Memory, Pages, View};
 
 use crate::sdo::{Channel, Client, Failure};
 
@@ -53,10 +57,13 @@ pub struct Bench {
 }
 
 /// The parameter store in RAM.
-pub type Flash = Store<Memory<Vec<u8>>>;
+pub type Flash = ParameterMemory<Memory<Vec<u8>>>;
 
-const PAGES: Pages = Pages::new(0, 4 * 1024);
-const ERASED: [u8; 8 * 1024] = [0xFF; 8 * 1024];
+/// The pages of the board (memory.x).
+pub const PAGES: Pages = Pages::new(0, 16 * 1024);
+const ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
+/// The longest time for which the erase of a page stops the core.
+pub const ERASE: Duration = Duration::from_millis(500);
 
 /// A setup with recognisable values.
 #[must_use]
@@ -116,7 +123,8 @@ pub fn intact() -> PowerOn {
 /// When the store cannot be prepared.
 #[must_use]
 pub fn empty_store() -> Flash {
-    Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
+    let view = View::open(Memory(ERASED.to_vec()), PAGES).expect("pages");
+    ParameterMemory::prepare(view, EraseBudget::new(None)).expect("a store")
 }
 
 /// The store job that the node requests; `None` without a request.
@@ -136,9 +144,18 @@ pub fn take_job(protocol: &mut Protocol, now: Instant, out: &mut impl Transmit) 
 /// Carries out the store job of the node at once.
 pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
     if let Some(mut job) = take_job(protocol, now, out) {
-        let result = job.run(store);
+        let result = store.run(&mut job);
+        keep_room(protocol, store, now);
         let _ = protocol.finish(&job, result, now, out);
     }
+}
+
+/// Erases a page if one has to be erased and nobody misses the node meanwhile, and reports the state of the memory.
+pub fn keep_room<F: NorFlash>(protocol: &mut Protocol, store: &mut ParameterMemory<F>, now: Instant) {
+    if store.can_make_room(now) && protocol.can_pause(ERASE, now) {
+        let _ = store.make_room();
+    }
+    protocol.show_memory(store.state());
 }
 
 impl Bench {
@@ -177,7 +194,7 @@ impl Bench {
             measurement: Measurement::new(setup.personality, &power_on),
             out: Queue::default(),
             now: Instant(0),
-            store: Store::prepare(view).expect("a store"),
+            store: ParameterMemory::prepare(view, EraseBudget::new(None)).expect("a store"),
             encoder: RawEncoder::default(),
             buttons: [false; 2],
             setup: *unless_stored,
@@ -185,6 +202,7 @@ impl Bench {
             has_parameters: true,
             boot_data: fault,
         };
+        bench.protocol.show_memory(bench.store.state());
         bench.restart();
         bench.take();
         bench

@@ -5,7 +5,9 @@ use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, ErrorClass, Part, Soundness};
-use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL};
+use profiles::communication::{
+    LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL,
+};
 use profiles::fault::Flags;
 use profiles::{AnyProfile, Snapshot};
 use update::Authorisation;
@@ -13,6 +15,7 @@ use update::Authorisation;
 use crate::Setup;
 use crate::configured::Configured;
 use crate::fault::{CONDITIONS, flag_of};
+use crate::memory::MemoryState;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
 use crate::trial::ProgramTrial;
@@ -31,6 +34,8 @@ pub(crate) struct NodeApplication {
     /// The flags of active faults. A reset of the dictionary does not end a fault.
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
+    /// Room and wear of the parameter memory (2010h).
+    pub(crate) memory: MemoryState,
     /// Counters of lost events, as counted by the firmware (2001h).
     pub(crate) lost_events: [u32; LOST_EVENTS],
     pub(crate) trial: ProgramTrial,
@@ -48,6 +53,7 @@ impl NodeApplication {
             snapshot: Snapshot::default(),
             flags: Flags::default(),
             stored: Stored::NOTHING,
+            memory: MemoryState::UNKNOWN,
             lost_events: [0; LOST_EVENTS],
             trial: ProgramTrial::default(),
             authorisation: Authorisation::default(),
@@ -68,6 +74,14 @@ impl NodeApplication {
     /// Shows the personality of the next start.
     pub(crate) fn show_personality(&self, image: &mut [u8]) {
         self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
+    }
+
+    /// Shows room and wear of the parameter memory.
+    pub(crate) fn show_memory(&self, image: &mut [u8]) {
+        let MemoryState { erases, erases_allowed, .. } = self.memory;
+        self.show(PARAMETER_MEMORY, 1, &self.memory.accepted().to_le_bytes(), image);
+        self.show(PARAMETER_MEMORY, 2, &erases.to_le_bytes(), image);
+        self.show(PARAMETER_MEMORY, 3, &[erases_allowed], image);
     }
 
     pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
@@ -101,6 +115,7 @@ impl Application for NodeApplication {
         self.show_personality(image);
         self.show_flags(image);
         self.show_lost_events(image);
+        self.show_memory(image);
         self.show_trial(image);
         self.show_authorisation(image);
         self.show_values(image);
@@ -149,6 +164,11 @@ impl Application for NodeApplication {
     fn stores(&self, entry: &Entry) -> Option<Groups> {
         let stores = self.profile.stores(entry.index(), entry.sub());
         stores.then_some(Groups::one(Group::Application))
+    }
+
+    /// A program on trial stores nothing, because the previous program has to find its settings.
+    fn can_store(&self) -> Result<(), Abort> {
+        if self.trial.is_open() { Err(Abort::DeviceState) } else { self.memory.check() }
     }
 
     fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {

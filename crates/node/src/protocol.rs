@@ -101,18 +101,22 @@ impl Protocol {
     }
 
     /// Copies the values of the last millisecond into the dictionary, and sends the PDOs that their change triggers and
-    /// the process data that is due. Without a snapshot only due process data is sent.
+    /// the process data that is due. Without a snapshot only due process data is sent. When a job of `take_job` no longer
+    /// waits for samples, the services are due at once.
     pub fn publish(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let snapshot = &self.device.application().snapshot;
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
+        let was_waiting = self.older_samples > 0;
         self.older_samples = self.older_samples.saturating_sub(1);
         let shown = Shown::of(snapshot);
         if self.shown != shown {
             self.follow_faults(shown, now);
         }
-        self.device.publish(now, out, NodeApplication::show_values)
+        let next = self.device.publish(now, out, NodeApplication::show_values);
+        let can_store = was_waiting && self.older_samples == 0 && self.job.is_some();
+        if can_store { Next { services: now, ..next } } else { next }
     }
 
     /// Handles expired PDO and SYNC timers.

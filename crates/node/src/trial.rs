@@ -53,6 +53,11 @@ impl ProgramTrial {
         }
     }
 
+    /// Whether the program is still on trial.
+    pub(crate) fn is_open(&self) -> bool {
+        self.state == Trial::Open
+    }
+
     /// Why the previous program was restored, in the codes of 1F57h; `None` if it was not.
     pub(crate) fn flash_status(&self) -> Option<u32> {
         let Trial::Over(reason) = self.state else { return None };
@@ -85,7 +90,7 @@ impl Protocol {
     /// so that it finds its settings.
     #[must_use]
     pub fn is_on_trial(&self) -> bool {
-        self.device.application().trial.state == Trial::Open
+        self.device.application().trial.is_open()
     }
 
     /// Whether the previous program was restored, for a fault on the bus.

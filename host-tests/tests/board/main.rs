@@ -23,6 +23,7 @@ mod own_load;
 mod position_faults;
 mod power_cycles;
 mod races;
+mod room;
 mod rules;
 mod running;
 mod saves;

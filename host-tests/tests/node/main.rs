@@ -22,5 +22,6 @@ mod object_tables;
 mod personalities;
 mod pressure_node;
 mod program_trial;
+mod storing;
 mod stuck_client;
 mod unsafe_code;

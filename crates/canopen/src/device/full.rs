@@ -168,11 +168,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.apply_value(entry, value, now);
     }
 
-    fn store_at_once(&mut self, entry: &Entry) -> Result<(), Abort> {
-        match self.basic.application.stores(entry) {
-            Some(groups) => self.begin_deferred(Job::Store(groups)),
-            None => Ok(()),
-        }
+    fn check_store(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
+        self.check_store_at_once(entry)
+    }
+
+    fn store_at_once(&mut self, job: Job) -> Result<(), Abort> {
+        self.begin_deferred(job)
     }
 
     fn store_configuration(&mut self, configuration: Configuration) -> bool {

@@ -95,8 +95,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes an object for this node or for all nodes. A missing object is an error only if this node alone is
-    /// addressed.
+    /// Takes an object for this node or for all nodes. An object that is missing or rejects the value is an error only
+    /// if this node alone is addressed.
     fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Instant) {
         let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
         if !is_taken && node.is_some() {
@@ -104,16 +104,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Stores the value, if the object exists and accepts process data. Returns whether it does.
+    /// The entry at this place, if a multiplexed PDO can write it.
+    fn consumed(&self, at: Multiplexer) -> Option<Entry> {
+        let entry = self.basic.dictionary.find(at.index, at.sub).ok()?;
+        (entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST).then_some(entry)
+    }
+
+    /// Stores the value, if the object exists and accepts the value. Returns whether it does.
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
-        let entry = self.basic.dictionary.find(at.index, at.sub).ok();
-        let entry =
-            entry.filter(|entry| entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST);
-        if let Some(entry) = &entry {
-            let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
-            self.store_process_value(entry, bytes);
-        }
-        entry.is_some()
+        let Some(entry) = self.consumed(at) else { return false };
+        let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
+        self.store_process_value(&entry, bytes)
     }
 
     fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
@@ -121,7 +122,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         for line in 0..count {
             let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
             if let Some(at) = target {
-                self.store_mpdo(at, mpdo.data);
+                let _ = self.store_mpdo(at, mpdo.data);
                 return;
             }
         }

@@ -74,25 +74,28 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             let size = usize::from(mapped.bits / 8);
             let Some((bytes, behind)) = rest.split_at_checked(size) else { return };
             if let Ok(entry) = entry {
-                self.store_process_value(&entry, bytes);
+                let _ = self.store_process_value(&entry, bytes);
             }
             rest = behind;
         }
     }
 
-    /// Writes a value from a PDO, if the object accepts it.
-    pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) {
+    /// Writes a value from a PDO, if the object accepts it. Returns whether it does.
+    pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) -> bool {
+        let Ok(job) = self.check_store_at_once(entry) else { return false };
         let is_allowed = entry.check_value(little_endian(bytes)).is_ok()
             && (entry.rule() != Rule::Application
                 || self.basic.application.write(entry, bytes, &mut self.basic.image).is_ok());
         if !is_allowed {
-            return;
+            return false;
         }
         entry.field.set(&mut self.basic.image, bytes);
         if entry.rule() == Rule::Application || entry.is_parameter() {
             self.basic.pending.parameters_changed();
             self.basic.services_due = STALE;
         }
+        self.begin_checked(job);
+        true
     }
 
     #[inline(never)]

@@ -61,6 +61,12 @@ impl Services {
         self.lss.node_id()
     }
 
+    /// Whether no client waits for a response, except for that of a job.
+    pub(super) fn is_between_requests(&self) -> bool {
+        let waits = self.reply_due.min(self.block_due).min(self.lss.due());
+        self.server.is_between_requests() && waits == Instant::NEVER
+    }
+
     fn forget_transfer(&mut self) {
         self.server.reset();
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);

@@ -97,6 +97,11 @@ impl Pending {
         (self.job, self.is_waiting) = (Some(job), true);
     }
 
+    /// Whether a job waits to be handed over.
+    pub(super) fn has_job(&self) -> bool {
+        self.job.is_some()
+    }
+
     pub(super) fn identifiers_changed(&mut self) {
         (self.identifiers, self.is_waiting) = (true, true);
     }

@@ -36,6 +36,15 @@ impl Producer {
         self.due
     }
 
+    /// The latest instant at which a consumer with a time of 1.5 periods still expects the next heartbeat.
+    pub(crate) fn latest(&self) -> Instant {
+        match self.due {
+            _ if self.boot_up => Instant(0),
+            Instant::NEVER => Instant::NEVER,
+            due => due + Duration::from_millis(u64::from(self.period) / 2),
+        }
+    }
+
     /// Sends the boot-up message or the heartbeat, if it is due.
     pub(crate) fn poll(&mut self, id: CanId, state: State, context: &mut Context<'_, impl Transmit>) {
         if context.now < self.due {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use canopen::dictionary::{Entry, Group};
+use canopen::dictionary::{Entry, Group, Groups};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, ErrorClass, Fault, Part, Soundness, Stored};
@@ -39,6 +39,10 @@ pub(crate) struct Numbers {
     /// The stored values: communication, application, calibration.
     pub(crate) stored: [Vec<u8>; 3],
     pub(crate) is_damaged: bool,
+    /// The groups that a write to 6201h stores.
+    pub(crate) stores: Option<Groups>,
+    /// Why the memory accepts no job.
+    pub(crate) is_full: Option<Abort>,
     /// The reports of the device about the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
     pub(crate) told: Vec<Told>,
@@ -72,6 +76,14 @@ impl Application for Numbers {
         }
         assert_eq!((entry.index(), entry.sub()), (0x6102, 0));
         if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn stores(&self, entry: &Entry) -> Option<Groups> {
+        self.stores.filter(|_| entry.index() == 0x6201)
+    }
+
+    fn can_store(&self) -> Result<(), Abort> {
+        self.is_full.map_or(Ok(()), Err)
     }
 
     fn sends_events(&self, tpdo: u16) -> bool {

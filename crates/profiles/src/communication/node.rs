@@ -80,3 +80,18 @@ pub const LOST_EVENT_ROWS: &[Object] = &[
     count(7, "Writes to the backup memory"),
     count(8, "Flash operations"),
 ];
+
+/// Index of the object about the parameter memory.
+pub const PARAMETER_MEMORY: u16 = 0x2010;
+
+const fn memory(sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(PARAMETER_MEMORY, sub, name, kind, Access::ReadOnly)
+}
+
+/// 2010h: room and wear of the parameter memory. docs/communication.md describes when the node makes room.
+pub const PARAMETER_MEMORY_ROWS: &[Object] = &[
+    Object::highest(PARAMETER_MEMORY, 3, "Parameter memory"),
+    memory(1, "Saves left", Type::Unsigned16),
+    memory(2, "Page erases", Type::Unsigned16),
+    memory(3, "Page erases allowed", Type::Unsigned8),
+];
