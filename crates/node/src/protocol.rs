@@ -6,7 +6,7 @@ use profiles::board::Outputs;
 use profiles::{Parameters, ROOM, Snapshot};
 
 use crate::application::NodeApplication;
-use crate::faults::Shown;
+use crate::faults::{Shown, present};
 use crate::{Next, Setup};
 
 /// Samples that may have been taken with the old parameters: the sample of this millisecond may have been taken, and
@@ -18,7 +18,7 @@ const OLDER_SAMPLES: u8 = 3;
 #[derive(Debug)]
 pub struct Protocol {
     pub(crate) device: canopen::device!(NodeApplication, room: ROOM),
-    /// The faults shown by the last snapshot: most samples change none.
+    /// The faults of the profile that are reported: most samples change none.
     pub(crate) shown: Shown,
     /// The job of the last `Action::Store`, until it is taken.
     pub(crate) job: Option<Job>,
@@ -102,9 +102,9 @@ impl Protocol {
             return self.device.poll_process(now, out);
         }
         self.older_samples = self.older_samples.saturating_sub(1);
-        let shown = Shown::of(snapshot);
-        if self.shown != shown {
-            self.follow_faults(shown, now);
+        let changed = self.shown.update(present(snapshot));
+        if changed != 0 {
+            self.follow_faults(changed, now);
         }
         self.device.publish(now, out, NodeApplication::show_values)
     }

@@ -197,8 +197,14 @@ impl<B: Body> Node<B> {
         let basic = self.body.basic_mut();
         if !basic.is_initialising() {
             let id = basic.service(ERROR_CONTROL);
-            basic.heartbeat.poll(id, basic.state, context);
+            // Nothing is sent before the boot-up message. A heartbeat with a new state follows the EMCY that gives the
+            // reason.
+            if basic.heartbeat.boots_up() {
+                basic.heartbeat.poll(id, basic.state, context);
+            }
             self.body.poll_errors(context);
+            let basic = self.body.basic_mut();
+            basic.heartbeat.poll(id, basic.state, context);
             self.silence_services();
         }
         if self.body.basic().state.has_services() {
