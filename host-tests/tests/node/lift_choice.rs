@@ -159,8 +159,10 @@ fn download(from: &mut Bench, to: &mut Bench) {
             continue;
         }
         let value = from.read(row.index, row.sub).unwrap();
-        if to.read(row.index, row.sub).unwrap() != value {
-            to.write(row.index, row.sub, &value).unwrap_or_else(|abort| panic!("{row:X?}: {abort:X}h"));
+        let is_new = to.read(row.index, row.sub).unwrap() != value;
+        // A few values cannot be written in every state, not even with the value that they have.
+        if let Err(abort) = to.write(row.index, row.sub, &value) {
+            assert!(!is_new, "{row:X?}: {abort:X}h");
         }
     }
 }
@@ -198,12 +200,12 @@ fn a_download_in_ascending_order_gives_the_same_node() {
             let (mut from, mut to) = (lift(id), lift(id));
             setup(&mut from);
             download(&mut from, &mut to);
-            assert_eq!(parameters(&mut to), parameters(&mut from), "setup {number}");
+            assert!(parameters(&mut to) == parameters(&mut from), "setup {number}");
             for bench in [&mut from, &mut to] {
                 save(bench, 1);
             }
             let (mut from, mut to) = (from.power_cycled(), to.power_cycled());
-            assert_eq!(parameters(&mut to), parameters(&mut from), "setup {number}, after a power cycle");
+            assert!(parameters(&mut to) == parameters(&mut from), "setup {number}, after a power cycle");
         }
     }
 }
