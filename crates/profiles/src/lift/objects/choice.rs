@@ -51,10 +51,14 @@ impl Choice {
         }
     }
 
-    /// Makes the TPDO valid if its virtual device is there and no client has switched the TPDO off.
+    /// Makes the TPDO valid if its virtual device is there and no client has switched the TPDO off. With `forgets`, it no
+    /// longer matters that a client has switched off a TPDO whose virtual device is not there.
     #[inline(never)]
-    fn switch(&self, number: usize, is_there: bool, image: &mut [u8]) {
+    fn switch(&self, number: usize, is_there: bool, forgets: bool, image: &mut [u8]) {
         let Some(cob_id) = self.cob_ids.get(number) else { return };
+        if forgets && !is_there {
+            self.note(number, false, image);
+        }
         let is_on = is_there && self.switched_off.u8(image) & bit(number) == 0;
         put(*cob_id, cob_id.u32(image) & !OFF | if is_on { 0 } else { OFF }, image);
     }
@@ -64,11 +68,6 @@ impl Choice {
     fn note(&self, number: usize, is_off: bool, image: &mut [u8]) {
         let others = self.switched_off.u8(image) & !bit(number);
         put(self.switched_off, u32::from(if is_off { others | bit(number) } else { others }), image);
-    }
-
-    /// Whether the COB-ID says that the TPDO is off.
-    fn is_off(&self, number: usize, image: &[u8]) -> bool {
-        self.cob_ids.get(number).is_some_and(|cob_id| cob_id.u32(image) & OFF != 0)
     }
 
     pub(super) fn devices(&self, image: &[u8]) -> Devices {
@@ -109,16 +108,15 @@ impl Fields {
         }
         for number in 0..TPDOS.len() {
             let is_there = self.has_tpdo(number, devices, image);
-            if is_new && !is_there {
-                self.choice.note(number, false, image);
-            } else if is_unknown && is_there {
-                self.choice.note(number, self.choice.is_off(number, image), image);
+            if is_unknown && is_there {
+                self.note(number, image);
             }
-            self.choice.switch(number, is_there, image);
+            self.choice.switch(number, is_there, is_new, image);
         }
     }
 
     /// Whether the virtual device of a TPDO is chosen, and has a sensor.
+    #[inline(never)]
     fn has_tpdo(&self, number: usize, devices: Devices, image: &[u8]) -> bool {
         match number.checked_sub(1).and_then(|unit| self.units.get(unit)) {
             Some(unit) => devices.has(Devices::POSITION) && unit.source.u8(image) != 0,
@@ -129,18 +127,22 @@ impl Fields {
     /// The TPDO of a position unit follows the sensor of the unit.
     #[inline(never)]
     pub(super) fn switch_position(&self, unit: usize, has_sensor: bool, image: &mut [u8]) {
-        let number = unit.wrapping_add(1);
-        if !has_sensor {
-            self.choice.note(number, false, image);
-        }
-        self.choice.switch(number, has_sensor && self.devices(image).has(Devices::POSITION), image);
+        let is_there = has_sensor && self.devices(image).has(Devices::POSITION);
+        self.choice.switch(unit.wrapping_add(1), is_there, !has_sensor, image);
+    }
+
+    /// Notes whether a client has switched the TPDO off.
+    #[inline(never)]
+    fn note(&self, number: usize, image: &mut [u8]) {
+        let is_off = self.choice.cob_ids.get(number).is_some_and(|cob_id| cob_id.u32(image) & OFF != 0);
+        self.choice.note(number, is_off, image);
     }
 
     /// A client has written the COB-ID of a TPDO.
     #[inline(never)]
     pub(super) fn note_switch(&self, communication: u16, image: &mut [u8]) {
         if let Some(number) = TPDOS.iter().position(|index| *index == communication) {
-            self.choice.note(number, self.choice.is_off(number, image), image);
+            self.note(number, image);
         }
     }
 

@@ -79,6 +79,7 @@ impl PanelFields {
     }
 
     /// Whether the words of a button are those of its input in 6100h.
+    #[inline(never)]
     fn follows_input(&self, button: usize, image: &[u8]) -> bool {
         let (Some([released, pressed]), Some(input)) = (self.buttons.get(button), self.inputs.get(button))
         else {
