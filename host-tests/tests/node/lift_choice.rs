@@ -5,6 +5,7 @@ use host_tests::bench::{Bench, raw};
 use host_tests::tables::table;
 use node::Personality;
 use profiles::lift::devices::Devices;
+use storage::{Change, GroupNumber};
 
 const START: u8 = 0x01;
 const RESET_NODE: u8 = 0x81;
@@ -146,6 +147,29 @@ fn a_tpdo_that_is_not_chosen_is_off_until_it_is() {
     bench.write(0x2301, 2, &[0]).unwrap();
     bench.write(0x2301, 2, &[1]).unwrap();
     assert_eq!(valid(&mut bench), [true, true, true, false, false], "a new unit");
+}
+
+/// Communication parameters of a firmware that had the COB-IDs only: what was off stays off, and follows the next choice.
+#[test]
+fn parameters_of_an_older_firmware_keep_what_was_switched_off() {
+    const LOAD_OFF: [u8; 9] = [0x01, 0x19, 1, 1, 4, 0x88, 0x01, 0x00, 0xC0];
+    const POSITION_ON: [u8; 9] = [0x06, 0x19, 1, 1, 4, 0x8C, 0x01, 0x00, 0x40];
+    for (chosen, expected) in [(3, [false, true]), (0, [false, false])] {
+        let mut bench = lift(16);
+        let communication = [LOAD_OFF, POSITION_ON].concat();
+        let application = [0x05, 0x23, 0, 1, 1, chosen];
+        let set = |group, value| Change::Set { group, version: 0x0301, value };
+        let sets = [set(GroupNumber::Two, &communication[..]), set(GroupNumber::Three, &application)];
+        bench.store.save(&sets).unwrap();
+        let mut bench = bench.power_cycled();
+        assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
+        assert_eq!(valid(&mut bench)[..2], expected, "2305h = {chosen}");
+        save(&mut bench, 1);
+        let mut bench = bench.power_cycled();
+        assert_eq!(valid(&mut bench)[..2], expected, "stored again, 2305h = {chosen}");
+        bench.write(0x2305, 0, &[3]).unwrap();
+        assert_eq!(valid(&mut bench)[..2], [chosen == 0, true]);
+    }
 }
 
 /// Writes all parameters of one node to another in ascending order, as a generic tool downloads a DCF; without the
