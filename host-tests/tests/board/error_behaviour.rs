@@ -104,7 +104,7 @@ fn the_emcy_of_an_error_is_on_the_bus_before_the_node_stops() {
 }
 
 #[test]
-fn what_the_start_finds_is_on_the_bus_before_the_node_stops() {
+fn errors_found_at_a_start_are_on_the_bus_before_the_node_stops() {
     for (personality, id) in NODES {
         // A crash, and a sensor that is at a rail from the beginning.
         let mut setup = Setup::new(personality, id);

@@ -69,7 +69,7 @@ fn a_pre_defined_can_id_follows_the_node_id_whatever_its_flags_are() {
 
 /// The rows of which the profile fixes the CAN-ID have no other one.
 #[test]
-fn another_can_id_stays_as_it_is() {
+fn another_can_id_is_absolute() {
     for personality in Personality::ALL {
         for id in [1, 16, 127] {
             let mut bench = Bench::booted_at(personality, id);

@@ -122,7 +122,7 @@ fn a_tpdo_that_a_client_has_switched_off_stays_off() {
 
 /// 1010h:2 stores what a client has switched off, whatever is chosen later.
 #[test]
-fn what_is_switched_off_is_stored_with_the_communication_parameters() {
+fn a_tpdo_switched_off_is_stored_with_the_communication_parameters() {
     let mut bench = lift(16);
     bench.write(0x2305, 0, &[3]).unwrap();
     save(&mut bench, 3);
@@ -132,7 +132,7 @@ fn what_is_switched_off_is_stored_with_the_communication_parameters() {
 }
 
 #[test]
-fn a_tpdo_that_is_not_chosen_is_off_until_it_is() {
+fn a_new_choice_switches_its_tpdos_on() {
     let mut bench = lift(16);
     bench.write(0x2305, 0, &[3]).unwrap();
     switch(&mut bench, 0x1901, false);
@@ -151,7 +151,7 @@ fn a_tpdo_that_is_not_chosen_is_off_until_it_is() {
 
 /// Communication parameters of a firmware that had the COB-IDs only: what was off stays off, and follows the next choice.
 #[test]
-fn parameters_of_an_older_firmware_keep_what_was_switched_off() {
+fn parameters_of_an_older_firmware_keep_switched_off_tpdos_off() {
     const LOAD_OFF: [u8; 9] = [0x01, 0x19, 1, 1, 4, 0x88, 0x01, 0x00, 0xC0];
     const POSITION_ON: [u8; 9] = [0x06, 0x19, 1, 1, 4, 0x8C, 0x01, 0x00, 0x40];
     for (chosen, expected) in [(3, [false, true]), (0, [false, false])] {

@@ -133,6 +133,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.take_heartbeat(frame, now);
     }
 
+    #[inline(never)]
     fn poll_errors(&mut self, context: &mut Context<'_, impl Transmit>) {
         while let Some(change) = self.watches.expire(context.now) {
             self.on_watch(change, context.now);

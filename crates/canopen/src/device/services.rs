@@ -194,17 +194,19 @@ impl<B: Body> Node<B> {
         self.services.lss.poll_switching(now, &mut self.body);
         let context = &mut self.services.context(now, out);
         self.services.lss.poll(context);
-        let basic = self.body.basic_mut();
-        if !basic.is_initialising() {
-            let id = basic.service(ERROR_CONTROL);
-            // Nothing is sent before the boot-up message. A heartbeat with a new state follows the EMCY that gives the
-            // reason.
-            if basic.heartbeat.boots_up() {
-                basic.heartbeat.poll(id, basic.state, context);
+        if !self.body.basic().is_initialising() {
+            // Nothing precedes the boot-up message. Any other heartbeat follows the EMCY that gives the reason for a new
+            // state.
+            let boots_up = self.body.basic().heartbeat.boots_up();
+            if !boots_up {
+                self.body.poll_errors(context);
             }
-            self.body.poll_errors(context);
             let basic = self.body.basic_mut();
+            let id = basic.service(ERROR_CONTROL);
             basic.heartbeat.poll(id, basic.state, context);
+            if boots_up {
+                self.body.poll_errors(context);
+            }
             self.silence_services();
         }
         if self.body.basic().state.has_services() {

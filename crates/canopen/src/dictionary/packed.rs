@@ -10,7 +10,7 @@
 //!
 //! A COB-ID with the pre-defined CAN-ID of the node follows the node-ID. It is stored with bit 29 set, which no COB-ID of
 //! a base frame has, and without the node-ID; if its flags have their defaults, it is left out. Any other COB-ID is
-//! stored as it is.
+//! stored as a number.
 //!
 //! Every value has its index, so a set that an older firmware has stored fits a newer dictionary: new objects keep
 //! their defaults. A set is refused as a whole if one of its objects no longer exists, has another size or does not
@@ -71,7 +71,7 @@ const fn is_next(a: &Object, b: &Object) -> bool {
 #[must_use]
 pub fn is_packed(mut packed: &[u8], index: u16, sub: u8) -> bool {
     while let Some((run, rest)) = Run::parse(packed) {
-        if run.index == index && run.values().any(|(own, _)| own == sub) {
+        if run.index == index && usize::from(sub.wrapping_sub(run.sub)) * run.size < run.bytes.len() {
             return true;
         }
         packed = rest;

@@ -264,7 +264,7 @@ fn bus_off_is_reported_before_the_node_stops() {
 }
 
 #[test]
-fn what_the_start_finds_is_an_error_too() {
+fn an_error_found_at_the_start_is_reported_before_the_node_stops() {
     for (behaviour, state) in [(0, State::PreOperational), (1, State::PreOperational), (2, State::Stopped)] {
         for is_damaged in [true, false] {
             let mut bench = Bench::unstarted();
