@@ -58,7 +58,8 @@ fn sends(bench: &mut Bench) -> Vec<u16> {
 /// Each way in which the two groups can part.
 #[test]
 fn a_tpdo_is_valid_while_its_virtual_device_is_chosen() {
-    let ways: [(&str, fn(Bench) -> Bench); 5] = [
+    type Way = fn(Bench) -> Bench;
+    let ways: [(&str, Way); 5] = [
         ("reset communication before a save", |mut bench| {
             reset(&mut bench, RESET_COMMUNICATION);
             bench
