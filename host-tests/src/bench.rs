@@ -171,6 +171,19 @@ impl Bench {
         Bench::start(ERASED.to_vec(), &Setup { personality, ..setup() }, intact())
     }
 
+    /// A node of this personality and node-ID that has booted.
+    #[must_use]
+    pub fn booted_at(personality: Personality, node_id: u8) -> Bench {
+        let setup = Setup { personality, node_id: NodeId::new(node_id), ..setup() };
+        Bench::start(ERASED.to_vec(), &setup, intact())
+    }
+
+    /// The node-ID, as the number that is added to a function code.
+    #[must_use]
+    pub fn id(&self) -> u16 {
+        self.protocol.node_id().map_or(0, NodeId::get).into()
+    }
+
     /// A node that has booted with this content of its parameter pages.
     #[must_use]
     pub fn with_flash(flash: Vec<u8>) -> Bench {
@@ -232,10 +245,10 @@ impl Bench {
 
     /// Boots, or boots again after a reset.
     pub fn restart(&mut self) {
-        let next = self.protocol.start(self.now, &mut self.out);
         if let Some(fault) = self.boot_data {
             let _ = self.protocol.set_fault(fault, true, self.now);
         }
+        let next = self.protocol.start(self.now, &mut self.out);
         self.keep(next);
     }
 
@@ -287,7 +300,8 @@ impl Bench {
 
     /// An NMT command for this node.
     pub fn nmt(&mut self, command: u8) {
-        self.receive(&Frame::new(0, &[command, ID]).expect("a frame"));
+        let [node_id, _] = self.id().to_le_bytes();
+        self.receive(&Frame::new(0, &[command, node_id]).expect("a frame"));
     }
 
     /// Does all work that is due and returns the next deadline.
@@ -359,11 +373,12 @@ impl Bench {
 /// The SDO channel; the node answers at once or not at all.
 impl Channel for Bench {
     fn send(&mut self, request: [u8; 8]) {
-        self.receive(&Frame::new(0x600 + u16::from(ID), &request).expect("a frame"));
+        self.receive(&Frame::new(0x600 + self.id(), &request).expect("a frame"));
     }
 
     fn received(&mut self) -> Option<[u8; 8]> {
-        let place = self.out.0.iter().position(|frame| frame.id() == 0x580 + u16::from(ID))?;
+        let response = 0x580 + self.id();
+        let place = self.out.0.iter().position(|frame| frame.id() == response)?;
         self.out.0.remove(place).data().try_into().ok()
     }
 

@@ -1,6 +1,6 @@
 //! The application of the CANopen device: the additions of the node to CiA 301, and its profile.
 
-use canopen::dictionary::{Entry, Group, Groups};
+use canopen::dictionary::{Entry, Group, Groups, is_packed};
 use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
@@ -9,6 +9,7 @@ use profiles::communication::{
     LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL,
 };
 use profiles::fault::Flags;
+use profiles::lift::objects::{SWITCHED_OFF, UNKNOWN_CHOICES};
 use profiles::{AnyProfile, Snapshot};
 use update::Authorisation;
 
@@ -84,6 +85,14 @@ impl NodeApplication {
         self.show(PARAMETER_MEMORY, 3, &[erases_allowed], image);
     }
 
+    /// Communication parameters that a firmware without 2307h has stored: TPDOs that were off stay off.
+    fn adopt_older_choice(&self, image: &mut [u8]) {
+        let packed = self.stored.get(Group::Communication).packed;
+        if !packed.is_empty() && !is_packed(packed, SWITCHED_OFF, 0) {
+            self.show(SWITCHED_OFF, 0, &[UNKNOWN_CHOICES], image);
+        }
+    }
+
     pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
         if let Ok(entry) = self.setup.personality.dictionary().find(index, sub) {
             entry.field().set(image, bytes);
@@ -111,6 +120,7 @@ impl Application for NodeApplication {
         show(0x1F56, 1, &setup.program_id.to_le_bytes());
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
         show(0x1F57, 1, &status.to_le_bytes());
+        self.adopt_older_choice(image);
         self.profile.initialise(image);
         self.show_personality(image);
         self.show_flags(image);

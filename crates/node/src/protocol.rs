@@ -7,7 +7,7 @@ use profiles::board::Outputs;
 use profiles::{Parameters, ROOM, Snapshot};
 
 use crate::application::NodeApplication;
-use crate::faults::Shown;
+use crate::faults::{Shown, present};
 use crate::{Next, Setup};
 
 /// Samples that may have been taken with the old parameters: the sample of this millisecond may have been taken, and
@@ -19,7 +19,7 @@ const OLDER_SAMPLES: u8 = 3;
 #[derive(Debug)]
 pub struct Protocol {
     pub(crate) device: canopen::device!(NodeApplication, room: ROOM),
-    /// The faults shown by the last snapshot: most samples change none.
+    /// The faults of the profile that are reported: most samples change none.
     pub(crate) shown: Shown,
     /// The job of the last `Action::Store`, until it is taken.
     pub(crate) job: Option<Job>,
@@ -110,9 +110,9 @@ impl Protocol {
         }
         let was_waiting = self.older_samples > 0;
         self.older_samples = self.older_samples.saturating_sub(1);
-        let shown = Shown::of(snapshot);
-        if self.shown != shown {
-            self.follow_faults(shown, now);
+        let changed = self.shown.update(present(snapshot));
+        if changed != 0 {
+            self.follow_faults(changed, now);
         }
         let next = self.device.publish(now, out, NodeApplication::show_values);
         let can_store = was_waiting && self.older_samples == 0 && self.job.is_some();

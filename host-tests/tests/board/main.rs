@@ -11,6 +11,7 @@ mod cost;
 mod damage;
 mod differential;
 mod encoder;
+mod error_behaviour;
 mod faults;
 mod flashing;
 mod hal_examples;

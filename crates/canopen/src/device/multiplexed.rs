@@ -7,7 +7,7 @@ use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
-use crate::{Instant, NodeId};
+use crate::{Frame, Instant, NodeId};
 
 /// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
 const SCANNER_LIST: u16 = 0x1FA0;
@@ -102,6 +102,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if !is_taken && node.is_some() {
             self.report(Fault::MpdoNotTaken, now);
         }
+    }
+
+    /// Whether a frame of any node can be a multiplexed PDO for this node: eight bytes that name an object which
+    /// accepts process data. Any other frame is a PDO of a node that uses the CAN-ID otherwise.
+    pub(super) fn is_mpdo(&self, frame: &Frame) -> bool {
+        let mpdo = if frame.len() == 8 { Mpdo::parse(frame.bytes()) } else { None };
+        mpdo.is_some_and(|mpdo| {
+            matches!(mpdo.address, Address::Source(_)) || self.consumed(mpdo.at).is_some()
+        })
     }
 
     /// The entry at this place, if a multiplexed PDO can write it.

@@ -141,8 +141,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
             }
-            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value)),
-            Rule::EmcyCobId => self.emcy.configure(value),
+            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value), now),
+            Rule::EmcyCobId if self.emcy.configure(value) => self.report_active(now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),
             Rule::PdoCobId

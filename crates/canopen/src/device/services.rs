@@ -221,11 +221,19 @@ impl<B: Body> Node<B> {
         }
         let context = &mut self.services.context(now, out);
         self.services.lss.poll(context);
-        let basic = self.body.basic_mut();
-        if !basic.is_initialising() {
+        if !self.body.basic().is_initialising() {
+            // Nothing precedes the boot-up message. Any other heartbeat follows the EMCY that gives the reason for a new
+            // state.
+            let boots_up = self.body.basic().heartbeat.boots_up();
+            if !boots_up {
+                self.body.poll_errors(context);
+            }
+            let basic = self.body.basic_mut();
             let id = basic.service(ERROR_CONTROL);
             basic.heartbeat.poll(id, basic.state, context);
-            self.body.poll_errors(context);
+            if boots_up {
+                self.body.poll_errors(context);
+            }
             self.silence_services();
         }
         if self.body.basic().state.has_services() {

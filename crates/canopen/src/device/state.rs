@@ -24,7 +24,7 @@ enum Reset {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Scope {
     Everything,
-    /// The objects below 2000h.
+    /// The objects below 2000h, and others that are stored with them.
     Communication,
     Group(Group),
 }
@@ -33,7 +33,9 @@ impl Scope {
     fn contains(self, entry: &Entry) -> bool {
         match self {
             Scope::Everything => true,
-            Scope::Communication => entry.index() < 0x2000,
+            Scope::Communication => {
+                entry.index() < 0x2000 || entry.attributes.group == Some(Group::Communication)
+            }
             Scope::Group(group) => entry.attributes.group == Some(group),
         }
     }
@@ -50,9 +52,9 @@ pub(super) struct Pending {
     reset_is_new: bool,
     identifiers: bool,
     parameters: bool,
-    /// The NMT state to enter with the first values, if 1F80h asks for it: before, PDOs would carry values nobody has
-    /// measured.
-    pub(super) self_start_state: Option<State>,
+    /// The NMT state to enter later: Operational with the first measured values, if 1F80h asks for it; Stopped when the
+    /// EMCYs of an error are sent, if 1029h asks for it. A command of the master cancels both.
+    pub(super) next_state: Option<State>,
     /// A request of LSS or of program control.
     request: Option<Action>,
     /// A job to store or restore values.
@@ -67,7 +69,7 @@ impl Pending {
             reset_is_new: false,
             identifiers: false,
             parameters: false,
-            self_start_state: None,
+            next_state: None,
             request: None,
             job: None,
         }
@@ -160,7 +162,7 @@ impl<B: Body> Node<B> {
 
     pub(super) fn command(&mut self, command: Command) {
         let pending = &mut self.body.basic_mut().pending;
-        pending.self_start_state = None;
+        pending.next_state = None;
         let state = match command {
             Command::Start => State::Operational,
             Command::Stop => State::Stopped,
@@ -229,9 +231,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
     pub(super) fn self_start(&mut self, context: &mut Context<'_, impl Transmit>) {
-        let Some(state) = self.basic.pending.self_start_state.take() else { return };
-        if self.emcy.register() == 0 {
-            self.enter(state);
+        let next_state = &mut self.basic.pending.next_state;
+        if next_state.take_if(|state| *state == State::Operational).is_some() && self.emcy.register() == 0 {
+            self.enter(State::Operational);
             self.send_process(context);
         }
     }

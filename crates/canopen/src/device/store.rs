@@ -10,8 +10,8 @@ use super::{Action, Application, Device, Next, STALE};
 use crate::dictionary::{Entry, Group, Groups, Rule};
 use crate::emcy::Fault;
 use crate::lss::Configuration;
-use crate::sdo::Abort;
 use crate::nmt::State;
+use crate::sdo::Abort;
 use crate::{Duration, Instant, Transmit};
 
 /// Signatures that 1010h and 1011h take: "save" and "load".
@@ -217,7 +217,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Loads the stored values of a group. If they are damaged or do not fit, the whole group keeps its defaults.
     pub(super) fn load_stored(&mut self, group: Group) {
         let Stored { packed, soundness } = self.basic.application.stored(group);
-        let fits = self.basic.dictionary.unpack(group, packed, &mut self.basic.image).is_ok()
+        let (dictionary, node_id) = (self.basic.dictionary, self.basic.node_id);
+        let fits = dictionary.unpack(group, node_id, packed, &mut self.basic.image).is_ok()
             && self.mappings_are_sound();
         if !fits {
             self.basic_mut().load_defaults(Scope::Group(group));

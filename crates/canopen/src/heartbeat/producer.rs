@@ -31,6 +31,11 @@ impl Producer {
         }
     }
 
+    /// Whether the boot-up message has not been sent yet.
+    pub(crate) fn boots_up(&self) -> bool {
+        self.boot_up
+    }
+
     /// When the next message is due.
     pub(crate) fn due(&self) -> Instant {
         self.due

@@ -17,6 +17,8 @@ pub(crate) const SENSOR_BREAK: u8 = 0;
 pub(crate) const PRESSURE_RAIL: u8 = 1;
 pub(crate) const TEMPERATURE_RAIL: u8 = 2;
 pub(crate) const UNEXPECTED_RESET: u8 = 3;
+/// The only condition to which 1029h:2 applies.
+pub(crate) const DEVICE_FAULT: u8 = 4;
 
 /// Calls of the application by the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +59,13 @@ pub(crate) struct Numbers {
 }
 
 impl Application for Numbers {
-    const CONDITIONS: &'static [Condition] =
-        &[Condition::new(0x5006), Condition::new(0x8002), Condition::new(0x8001), Condition::new(0x6101)];
+    const CONDITIONS: &'static [Condition] = &[
+        Condition::new(0x5006),
+        Condition::new(0x8002),
+        Condition::new(0x8001),
+        Condition::new(0x6101),
+        Condition::new(0x5003).of_class(ErrorClass::DEVICE),
+    ];
 
     fn initialise(&mut self, image: &mut [u8]) {
         DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);

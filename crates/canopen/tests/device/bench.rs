@@ -14,7 +14,9 @@ use crate::application::Numbers;
 use crate::exchange;
 use crate::rows::ROWS;
 
-pub(crate) use crate::application::{PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL, Told, UNEXPECTED_RESET};
+pub(crate) use crate::application::{
+    DEVICE_FAULT, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL, Told, UNEXPECTED_RESET,
+};
 pub(crate) use crate::rows::{DICTIONARY, rows};
 
 /// A transmit queue that keeps all frames, as long as it has room.

@@ -149,6 +149,19 @@ fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
     }
 }
 
+/// 6203h accepts -5 to 5, and the application rejects 13 at 6201h.
+#[test]
+fn a_value_that_the_object_rejects_is_an_error_for_the_node_that_is_addressed() {
+    for (object, value) in [([0x03, 0x62, 0], 6), ([0x01, 0x62, 0], 13)] {
+        for (address, expected) in [(0x80 | ID, vec![0x8230]), (0x80, vec![])] {
+            let mut bench = receiver(DESTINATION);
+            let [low, high, sub] = object;
+            bench.receive(Frame::new(RPDO, &[address, low, high, sub, value, 0, 0, 0]).unwrap());
+            assert_eq!(errors(&mut bench), expected, "{object:x?}");
+        }
+    }
+}
+
 #[test]
 fn a_short_one_is_a_length_error() {
     let mut bench = receiver(DESTINATION);

@@ -123,7 +123,7 @@ impl Fields {
         if bytes != field.get(image) {
             self.unit(number)?.offset.store(image, [0; 4]);
         }
-        self.switch_position(number, bytes != [0] && self.devices(image).has(Devices::POSITION), image);
+        self.switch_position(number, bytes != [0], image);
         Ok(())
     }
 
