@@ -29,6 +29,7 @@ pub mod meaning;
 mod network;
 pub mod nmt;
 pub mod object;
+mod other_clients;
 mod pdo_parameters;
 pub mod quantity;
 pub mod scan;

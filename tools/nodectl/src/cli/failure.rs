@@ -145,7 +145,7 @@ fn left_words(left_behind: &[String]) -> String {
 fn sdo_code(error: &sdo::Error) -> u8 {
     match error.cause {
         Cause::Transfer(transfer::Error::Abort(_)) => 1,
-        Cause::Transfer(_) => 3,
+        Cause::Transfer(_) | Cause::Busy => 3,
         Cause::Bus(_) => 4,
     }
 }

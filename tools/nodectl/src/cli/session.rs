@@ -17,13 +17,16 @@ use super::{Failure, Options, Output};
 use crate::bus::NoBus;
 use crate::configuration::Configuration;
 use crate::object::at;
-use crate::sdo::{self, Client};
+use crate::sdo::{self, Channel, Client};
 use crate::text::visible_lines;
 use crate::value;
 use crate::{Catalogue, Network};
 
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
+
+/// How long to listen before the first request. The frames of a running transfer come more often.
+const LISTEN: Duration = Duration::from_millis(50);
 
 /// A factor on the time limit for reading a whole dictionary. A slow bus needs 20 s for 400 objects; this limit is
 /// three times as long.
@@ -50,7 +53,9 @@ impl Session {
         // Read the data sheet first, so that a wrong one is reported before the bus is opened.
         let sheet = options.eds.as_deref().map(sheet).transpose()?;
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
-        let network = Network::open(move || address.open(bit_rate))?;
+        let mut network = Network::open(move || address.open(bit_rate))?;
+        // Another client's transfer may run already.
+        network.pause(LISTEN)?;
         Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
@@ -107,7 +112,21 @@ impl Session {
             Some(sheet) => Catalogue::new(sheet),
             None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
         };
+        self.choose_channel(node, &catalogue)?;
         Ok(Arc::clone(self.catalogues.entry(node).or_insert(Arc::new(catalogue))))
+    }
+
+    /// Uses the second SDO server of a node (1201h) where the node has one that is switched on: the first one may have
+    /// another client.
+    fn choose_channel(&mut self, node: NodeId, catalogue: &Catalogue) -> Result<(), Failure> {
+        let [request, response] = [at(0x1201, 1), at(0x1201, 2)];
+        if catalogue.entry(request).is_none() {
+            return Ok(());
+        }
+        let cob_ids = self.word(node, request)?.zip(self.word(node, response)?);
+        let channel = cob_ids.and_then(|(request, response)| Channel::of_cob_ids(request, response));
+        self.network.set_channel(node, channel);
+        Ok(())
     }
 
     /// Whether the catalogue of a node is known already.
