@@ -25,6 +25,6 @@ pub use device::{DEVICES, Device};
 pub use error::{Error, Problem};
 pub use find::{LookupError, address};
 pub use generated::{File, files};
-pub use model::{DeviceInfo, Eds, Entry, Object};
+pub use model::{DeviceInfo, Eds, Entry, Flags, Object};
 pub use types::{Access, Class, DataType, ObjectType};
 pub use value::{Formula, Value};

@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Write};
 use product::REVISION;
 
 use crate::read::BIT_RATES;
-use crate::{Device, DeviceInfo, Eds, Entry, Object, ObjectType};
+use crate::{Device, DeviceInfo, Eds, Entry, Flags, Object, ObjectType};
 
 /// Day of the release, month first (CiA 306). A constant, so that every run writes the same text; it changes with
 /// `REVISION`.
@@ -165,6 +165,9 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
         if let Some(value) = value {
             out.key(key, value.text(entry.data_type))?;
         }
+    }
+    if let Some(Flags(flags @ 1..)) = entry.flags {
+        out.key("ObjFlags", format_args!("0x{flags:X}"))?;
     }
     // CiA 306 has no such key for a domain, because no PDO carries one. The package canopen of npm refuses the key
     // there.

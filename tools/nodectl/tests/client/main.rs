@@ -3,6 +3,7 @@
 mod bad_input;
 mod blocks;
 mod check;
+mod cloning;
 mod commands;
 mod configuration;
 mod hostile;
