@@ -8,6 +8,7 @@
 mod compact;
 mod dcf;
 mod device;
+mod edition;
 mod error;
 mod find;
 mod generated;
@@ -22,6 +23,7 @@ mod write;
 
 pub use dcf::Commissioning;
 pub use device::{DEVICES, Device};
+pub use edition::Edition;
 pub use error::{Error, Problem};
 pub use find::{LookupError, address};
 pub use generated::{File, files};

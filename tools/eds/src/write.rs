@@ -5,12 +5,11 @@ use std::fmt::{self, Display, Write};
 use product::REVISION;
 
 use crate::read::BIT_RATES;
-use crate::{Device, DeviceInfo, Eds, Entry, Flags, Object, ObjectType};
+use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, ObjectType};
 
-/// Day of the release, month first (CiA 306). A constant, so that every run writes the same text; it changes with
-/// `REVISION`.
-const RELEASE_DATE: &str = "11-21-2026";
-const RELEASE_TIME: &str = "12:00AM";
+/// Day of the first release, month first (CiA 306).
+const CREATION_DATE: &str = "11-21-2026";
+const TIME: &str = "12:00AM";
 const AUTHOR: &str = "cargo xtask eds";
 
 const COMMENTS: [&str; 2] = [
@@ -30,36 +29,36 @@ const DUMMIES: [(&str, u8); 7] = [
 ];
 
 impl Device {
-    /// The text of the data sheet.
+    /// The text of the data sheet in an edition.
     #[must_use]
-    pub fn sheet(&self) -> String {
+    pub fn sheet(&self, edition: &Edition) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write(&mut Sections { out: &mut text });
+        let _ = self.write(edition, &mut Sections { out: &mut text });
         text
     }
 
-    fn write(&self, out: &mut Sections) -> fmt::Result {
+    fn write(&self, edition: &Edition, out: &mut Sections) -> fmt::Result {
         let eds = self.eds();
-        self.file_info(out)?;
+        self.file_info(edition, out)?;
         device_info(&eds.device, out)?;
         dummies(out)?;
         comments(out)?;
         object_lists(&eds, out)
     }
 
-    fn file_info(&self, out: &mut Sections) -> fmt::Result {
+    fn file_info(&self, edition: &Edition, out: &mut Sections) -> fmt::Result {
         out.section("FileInfo", "")?;
         out.key("FileName", self.file_name)?;
         out.key("FileVersion", REVISION >> 16)?;
-        out.key("FileRevision", REVISION & 0xFFFF)?;
+        out.key("FileRevision", edition.revision)?;
         out.key("EDSVersion", "4.0")?;
         out.key("Description", self.description)?;
-        out.key("CreationTime", RELEASE_TIME)?;
-        out.key("CreationDate", RELEASE_DATE)?;
+        out.key("CreationTime", TIME)?;
+        out.key("CreationDate", CREATION_DATE)?;
         out.key("CreatedBy", AUTHOR)?;
-        out.key("ModificationTime", RELEASE_TIME)?;
-        out.key("ModificationDate", RELEASE_DATE)?;
+        out.key("ModificationTime", TIME)?;
+        out.key("ModificationDate", &edition.date)?;
         out.key("ModifiedBy", AUTHOR)
     }
 }
@@ -79,6 +78,7 @@ pub(crate) fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Resul
     out.key("SimpleBootUpSlave", 1)?;
     out.key("Granularity", device.granularity)?;
     out.key("DynamicChannelsSupported", 0)?;
+    out.key("CompactPDO", 0)?;
     out.key("GroupMessaging", u8::from(device.group_messaging))?;
     out.key("NrOfRXPDO", device.rpdos)?;
     out.key("NrOfTXPDO", device.tpdos)?;
