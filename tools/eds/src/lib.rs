@@ -29,4 +29,4 @@ pub use find::{LookupError, address};
 pub use generated::{File, files};
 pub use model::{DeviceInfo, Eds, Entry, Flags, Object};
 pub use types::{Access, Class, DataType, ObjectType};
-pub use value::{Formula, Value};
+pub use value::{Formula, Reals, Value};

@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Write};
 use product::REVISION;
 
 use crate::read::BIT_RATES;
-use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, ObjectType};
+use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, ObjectType, Reals};
 
 /// Day of the first release, month first (CiA 306).
 const CREATION_DATE: &str = "11-21-2026";
@@ -34,7 +34,7 @@ impl Device {
     pub fn sheet(&self, edition: &Edition) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write(edition, &mut Sections { out: &mut text });
+        let _ = self.write(edition, &mut Sections { out: &mut text, reals: Reals::Bits });
         text
     }
 
@@ -156,14 +156,14 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
     out.key("DataType", format_args!("0x{:04X}", entry.data_type.0))?;
     out.key("AccessType", entry.access.text())?;
     let values = [
-        ("DefaultValue", &entry.default),
-        ("ParameterValue", &entry.value),
-        ("LowLimit", &entry.low),
-        ("HighLimit", &entry.high),
+        ("DefaultValue", &entry.default, Reals::Bits),
+        ("ParameterValue", &entry.value, out.reals),
+        ("LowLimit", &entry.low, Reals::Bits),
+        ("HighLimit", &entry.high, Reals::Bits),
     ];
-    for (key, value) in values {
+    for (key, value, reals) in values {
         if let Some(value) = value {
-            out.key(key, value.text(entry.data_type))?;
+            out.key(key, value.text(entry.data_type, reals))?;
         }
     }
     if let Some(Flags(flags @ 1..)) = entry.flags {
@@ -180,6 +180,8 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
 /// Sections of keys, with the line ends of CiA 306.
 pub(crate) struct Sections<'a> {
     pub(crate) out: &'a mut String,
+    /// The form of real numbers that are the value of a parameter.
+    pub(crate) reals: Reals,
 }
 
 impl Sections<'_> {

@@ -42,4 +42,4 @@ pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
-pub use network::{Logged, Network};
+pub use network::{Heard, Logged, Network};

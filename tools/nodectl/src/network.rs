@@ -1,7 +1,7 @@
 //! The shared access of the services to a bus: waiting for one frame without losing the others, and opening the bus
 //! again.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use canopen::client::heartbeat::Heartbeat;
 use canopen::client::{Service, Step, Taken};
@@ -42,6 +42,13 @@ pub struct Logged {
     pub is_sent: bool,
 }
 
+/// What was heard of a node, whether it answers or not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// The state in the newest heartbeat or boot-up message; `None` without one.
+    pub state: Option<State>,
+}
+
 /// A bus that can be opened again after it is lost.
 pub struct Network {
     opener: Box<dyn FnMut() -> Result<Box<dyn Bus>, BusError>>,
@@ -51,6 +58,7 @@ pub struct Network {
     newest: Option<(Instant, Instant)>,
     log: Option<Vec<Logged>>,
     others: OtherClients,
+    heard: BTreeMap<NodeId, Heard>,
 }
 
 impl Network {
@@ -63,7 +71,7 @@ impl Network {
     ) -> Result<Network, BusError> {
         let bus = opener()?;
         let (opener, kept) = (Box::new(opener), VecDeque::new());
-        Ok(Network { opener, bus, kept, newest: None, log: None, others: OtherClients::default() })
+        Ok(Network { opener, bus, kept, newest: None, log: None, others: OtherClients::default(), heard: BTreeMap::new() })
     }
 
     /// Opens the bus again. The kept frames of the old bus are dropped.
@@ -101,6 +109,18 @@ impl Network {
     pub fn last_state(&self, node: NodeId) -> Option<State> {
         let heartbeats = self.kept.iter().rev().filter_map(|received| Heartbeat::parse(&received.frame));
         heartbeats.filter(|heard| heard.node == node).map(|heard| heard.state).next()
+    }
+
+    /// What was heard of a node since the bus was opened: heartbeats, emergencies, and PDOs of the pre-defined connection
+    /// set. `None` where nothing was heard.
+    #[must_use]
+    pub fn heard(&self, node: NodeId) -> Option<Heard> {
+        self.heard.get(&node).copied()
+    }
+
+    /// All nodes that were heard.
+    pub fn all_heard(&self) -> impl Iterator<Item = (NodeId, Heard)> {
+        self.heard.iter().map(|(node, heard)| (*node, *heard))
     }
 
     /// The oldest kept frame.
@@ -283,11 +303,23 @@ impl Network {
         self.wait(until, |_| None::<()>).map(drop)
     }
 
+    fn hear(&mut self, frame: &Frame) {
+        let id = frame.id();
+        let node = u8::try_from(id & 0x7F).ok().and_then(NodeId::new);
+        let is_sender = matches!(id, 0x081..=0x0FF | 0x181..=0x1FF | 0x281..=0x2FF | 0x381..=0x3FF | 0x481..=0x4FF)
+            || (matches!(id, 0x701..=0x77F) && !frame.is_remote());
+        if let Some(node) = node.filter(|_| is_sender) {
+            let heard = self.heard.entry(node).or_default();
+            heard.state = Heartbeat::parse(frame).map(|heartbeat| heartbeat.state).or(heard.state);
+        }
+    }
+
     fn fetch(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
         let received = self.bus.receive(until)?;
         if let Some(received) = received {
             let here = self.bus.now();
             self.newest = Some((received.at, here));
+            self.hear(&received.frame);
             self.others.on_frame(&received.frame, here);
             // After a boot, an additional SDO server may be off again.
             if let Some(Heartbeat { node, state: State::Initialising }) = Heartbeat::parse(&received.frame) {

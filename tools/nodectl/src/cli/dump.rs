@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use clap::Args;
-use eds::{Commissioning, Eds};
+use eds::{Commissioning, Eds, Reals};
 use serde::{Serialize, Serializer};
 
 use super::read::place;
@@ -17,7 +17,7 @@ use super::{Failure, Session};
 use crate::configuration::{Configuration, Difference, Write, is_unclear, node_of, plan};
 use crate::object::{Place, at};
 use crate::sdo::AbortCode;
-use crate::text::visible;
+use crate::text::{note, visible};
 use crate::value::Value;
 
 /// Writes the configuration of a node to a file: a DCF with the values that differ from the defaults.
@@ -30,6 +30,10 @@ pub(super) struct Dump {
     /// All parameters, also those with default values.
     #[arg(long)]
     all: bool,
+
+    /// Write real numbers as their bits, for Lely's tools; python-canopen does not read these.
+    #[arg(long)]
+    bits: bool,
 }
 
 /// Compares two configurations: files (DCF or EDS), or the node itself.
@@ -106,7 +110,8 @@ impl Dump {
         file.commissioning =
             Some(Commissioning { node_id: node.get(), bit_rate: session.options.bit_rate, serial });
         let name = self.file.file_name().and_then(|name| name.to_str()).unwrap_or("-");
-        let text = file.to_dcf(name);
+        let reals = if self.bits { Reals::Bits } else { Reals::Decimal };
+        let text = file.to_dcf(name, reals);
         if self.file.as_os_str() == "-" {
             return Ok(session.output.write(text.as_bytes())?);
         }
@@ -184,7 +189,9 @@ impl Apply {
 fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
     if let Some(of_file) = node_of(sheet).filter(|of_file| *of_file != node) {
         let (of_file, node) = (of_file.get(), node.get());
-        eprintln!("the file is of node {of_file}; COB-IDs that follow the node-ID are {done} for node {node}");
+        note(format_args!(
+            "the file is of node {of_file}; COB-IDs that follow the node-ID are {done} for node {node}"
+        ));
     }
 }
 
@@ -192,10 +199,10 @@ fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
 fn note_unclear(sheet: &Eds) {
     let count = sheet.entries().filter(|entry| is_unclear(entry)).count();
     if count > 0 {
-        eprintln!(
+        note(format_args!(
             "{count} objects that an RPDO can write are left out: the data sheet does not say (ObjFlags) whether they \
              are parameters or process values"
-        );
+        ));
     }
 }
 

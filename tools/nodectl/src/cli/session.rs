@@ -18,9 +18,10 @@ use crate::bus::NoBus;
 use crate::configuration::Configuration;
 use crate::object::at;
 use crate::sdo::{self, Channel, Client};
-use crate::text::visible_lines;
+use crate::text::{note, visible_lines};
 use crate::value;
-use crate::{Catalogue, Network};
+use crate::network::Heard;
+use crate::{Catalogue, Network, heartbeat};
 
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
@@ -141,14 +142,14 @@ impl Session {
 
     /// The data sheet of a node; an error where none is known.
     pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
-        let sheet = self.catalogue(node)?.sheet().clone();
-        if sheet.device.product_name.is_empty() {
+        let catalogue = self.catalogue(node)?;
+        if !catalogue.is_of_a_device() {
             let node = node.get();
             return Err(Failure::Usage(format!(
                 "no data sheet is known for node {node}: give it with --eds"
             )));
         }
-        Ok(sheet)
+        Ok(catalogue.sheet().clone())
     }
 
     /// The values of all parameters of a node.
@@ -214,8 +215,8 @@ impl Session {
 
     /// A hint for the user on an error.
     fn hint(&self, error: &sdo::Error) -> Option<String> {
-        if error.is_silence() && self.network.last_state(error.node) == Some(State::Stopped) {
-            return Some("the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned());
+        if error.is_silence() {
+            return Some(silence(error.node, self.network.heard(error.node)));
         }
         let code = error.abort()?.0;
         let catalogue = self.catalogues.get(&error.node);
@@ -230,6 +231,16 @@ impl Session {
                      empty (sub-index 0 is 0)"
                 ))
             }
+            (0x0800_0022, 0x6125 | 0x6925) => {
+                let status = 0x6150 + (error.at.index - 0x6125);
+                Some(format!("the process value is not valid: see the status, {status:04X}h:{}", error.at.sub))
+            }
+            (0x0800_0022, 0x2200..=0x2202) if catalogue?.is_of_this_project() => {
+                Some("the calibration is locked; `nodectl write 2203 cali` opens it until the next reset".to_owned())
+            }
+            (0x0601_0000, 0x2107) if catalogue?.is_of_this_project() => {
+                Some("the factory data are locked; `nodectl write 2108 fact` opens them until the next reset".to_owned())
+            }
             (0x0609_0011, 0x1010 | 0x1011) => Some("the node has no such group of parameters".to_owned()),
             _ => None,
         }
@@ -240,13 +251,34 @@ impl Session {
         if self.options.json {
             return Ok(self.output.json(&failure.to_json())?);
         }
-        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
+        note(format_args!("nodectl: {}", visible_lines(&failure.to_string())));
         Ok(())
     }
 
     /// Prints a result.
     pub(super) fn print(&mut self, result: &(impl Serialize + Display)) -> Result<(), Failure> {
         Ok(self.output.print(result)?)
+    }
+}
+
+/// Why a node may not answer, and what the user can do.
+pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
+    let node = node.get();
+    match heard {
+        Some(Heard { state: Some(State::Stopped), .. }) => {
+            "the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned()
+        }
+        Some(Heard { state, .. }) => {
+            let state = state.map(|state| format!(" (it is {})", heartbeat::words(state))).unwrap_or_default();
+            format!(
+                "the node sends{state} and does not answer: its PDOs may leave no room on the bus; \
+                 `nodectl nmt preop -n {node}` ends them, then longer event timers and inhibit times help (1800h:5, 1800h:3)"
+            )
+        }
+        None => format!(
+            "nothing is heard of node {node}: is it on, with this node-ID and the bit rate of the bus? `nodectl scan` \
+             lists the nodes, `nodectl lss scan` those without a node-ID"
+        ),
     }
 }
 

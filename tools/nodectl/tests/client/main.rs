@@ -6,6 +6,7 @@ mod check;
 mod cloning;
 mod commands;
 mod configuration;
+mod everyday;
 mod hostile;
 mod loader;
 mod lss;
