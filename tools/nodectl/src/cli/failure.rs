@@ -106,6 +106,12 @@ impl Failure {
         matches!(self, Failure::Sdo(error) if error.is_silence())
     }
 
+    /// Whether the reader of the results has closed its end.
+    #[must_use]
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Failure::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+
     /// The failure as JSON: one schema for all commands.
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
@@ -145,7 +151,7 @@ fn left_words(left_behind: &[String]) -> String {
 fn sdo_code(error: &sdo::Error) -> u8 {
     match error.cause {
         Cause::Transfer(transfer::Error::Abort(_)) => 1,
-        Cause::Transfer(_) => 3,
+        Cause::Transfer(_) | Cause::Busy => 3,
         Cause::Bus(_) => 4,
     }
 }

@@ -17,13 +17,17 @@ use super::{Failure, Options, Output};
 use crate::bus::NoBus;
 use crate::configuration::Configuration;
 use crate::object::at;
-use crate::sdo::{self, Client};
-use crate::text::visible_lines;
+use crate::sdo::{self, Channel, Client};
+use crate::text::{note, visible_lines};
 use crate::value;
-use crate::{Catalogue, Network};
+use crate::network::Heard;
+use crate::{Catalogue, Network, heartbeat};
 
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
+
+/// How long to listen before the first request. The frames of a running transfer come more often.
+const LISTEN: Duration = Duration::from_millis(50);
 
 /// A factor on the time limit for reading a whole dictionary. A slow bus needs 20 s for 400 objects; this limit is
 /// three times as long.
@@ -50,7 +54,9 @@ impl Session {
         // Read the data sheet first, so that a wrong one is reported before the bus is opened.
         let sheet = options.eds.as_deref().map(sheet).transpose()?;
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
-        let network = Network::open(move || address.open(bit_rate))?;
+        let mut network = Network::open(move || address.open(bit_rate))?;
+        // Another client's transfer may run already.
+        network.pause(LISTEN)?;
         Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
@@ -107,7 +113,21 @@ impl Session {
             Some(sheet) => Catalogue::new(sheet),
             None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
         };
+        self.choose_channel(node, &catalogue)?;
         Ok(Arc::clone(self.catalogues.entry(node).or_insert(Arc::new(catalogue))))
+    }
+
+    /// Uses the second SDO server of a node (1201h) where the node has one that is switched on: the first one may have
+    /// another client.
+    fn choose_channel(&mut self, node: NodeId, catalogue: &Catalogue) -> Result<(), Failure> {
+        let [request, response] = [at(0x1201, 1), at(0x1201, 2)];
+        if catalogue.entry(request).is_none() {
+            return Ok(());
+        }
+        let cob_ids = self.word(node, request)?.zip(self.word(node, response)?);
+        let channel = cob_ids.and_then(|(request, response)| Channel::of_cob_ids(request, response));
+        self.network.set_channel(node, channel);
+        Ok(())
     }
 
     /// Whether the catalogue of a node is known already.
@@ -122,14 +142,14 @@ impl Session {
 
     /// The data sheet of a node; an error where none is known.
     pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
-        let sheet = self.catalogue(node)?.sheet().clone();
-        if sheet.device.product_name.is_empty() {
+        let catalogue = self.catalogue(node)?;
+        if !catalogue.is_of_a_device() {
             let node = node.get();
             return Err(Failure::Usage(format!(
                 "no data sheet is known for node {node}: give it with --eds"
             )));
         }
-        Ok(sheet)
+        Ok(catalogue.sheet().clone())
     }
 
     /// The values of all parameters of a node.
@@ -195,8 +215,8 @@ impl Session {
 
     /// A hint for the user on an error.
     fn hint(&self, error: &sdo::Error) -> Option<String> {
-        if error.is_silence() && self.network.last_state(error.node) == Some(State::Stopped) {
-            return Some("the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned());
+        if error.is_silence() {
+            return Some(silence(error.node, self.network.heard(error.node)));
         }
         let code = error.abort()?.0;
         let catalogue = self.catalogues.get(&error.node);
@@ -211,6 +231,16 @@ impl Session {
                      empty (sub-index 0 is 0)"
                 ))
             }
+            (0x0800_0022, 0x6125 | 0x6925) => {
+                let status = 0x6150 + (error.at.index - 0x6125);
+                Some(format!("the process value is not valid: see the status, {status:04X}h:{}", error.at.sub))
+            }
+            (0x0800_0022, 0x2200..=0x2202) if catalogue?.is_of_this_project() => {
+                Some("the calibration is locked; `nodectl write 2203 cali` opens it until the next reset".to_owned())
+            }
+            (0x0601_0000, 0x2107) if catalogue?.is_of_this_project() => {
+                Some("the factory data are locked; `nodectl write 2108 fact` opens them until the next reset".to_owned())
+            }
             (0x0609_0011, 0x1010 | 0x1011) => Some("the node has no such group of parameters".to_owned()),
             _ => None,
         }
@@ -221,13 +251,34 @@ impl Session {
         if self.options.json {
             return Ok(self.output.json(&failure.to_json())?);
         }
-        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
+        note(format_args!("nodectl: {}", visible_lines(&failure.to_string())));
         Ok(())
     }
 
     /// Prints a result.
     pub(super) fn print(&mut self, result: &(impl Serialize + Display)) -> Result<(), Failure> {
         Ok(self.output.print(result)?)
+    }
+}
+
+/// Why a node may not answer, and what the user can do.
+pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
+    let node = node.get();
+    match heard {
+        Some(Heard { state: Some(State::Stopped), .. }) => {
+            "the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned()
+        }
+        Some(Heard { state, .. }) => {
+            let state = state.map(|state| format!(" (it is {})", heartbeat::words(state))).unwrap_or_default();
+            format!(
+                "the node sends{state} and does not answer: its PDOs may leave no room on the bus; \
+                 `nodectl nmt preop -n {node}` ends them, then longer event timers and inhibit times help (1800h:5, 1800h:3)"
+            )
+        }
+        None => format!(
+            "nothing is heard of node {node}: is it on, with this node-ID and the bit rate of the bus? `nodectl scan` \
+             lists the nodes, `nodectl lss scan` those without a node-ID"
+        ),
     }
 }
 

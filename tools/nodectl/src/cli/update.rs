@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::failure::update_code;
 use super::output::hex;
 use super::{Failure, Session};
-use crate::text::visible;
+use crate::text::{note, visible};
 use crate::update::{Error, Image, Options, Outcome, Step, Watcher, update};
 
 /// Replaces the program of nodes (CiA 302-3), one after the other.
@@ -163,7 +163,7 @@ impl Watcher for Bar {
         self.0.reset();
         // Without a terminal the steps are printed as lines.
         if self.0.is_hidden() {
-            eprintln!("node {}: {step}", node.get());
+            note(format_args!("node {}: {step}", node.get()));
         }
     }
 
