@@ -92,7 +92,7 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
 pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal: &mut u32) -> Decision {
     let commit = commit(flash, target);
     let trial = trial(flash, target, start);
-    let is_on_trial = matches!(trial, Trial::Open | Trial::Lost(_));
+    let is_on_trial = trial.is_undecided();
     let crashes = start.crashes.count();
     if !is_on_trial {
         note_proven(flash, target, start.proof);
@@ -154,10 +154,10 @@ fn note_proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) {
     }
 }
 
-/// Records that nothing older than this application may run from now on.
+/// Records that nothing older than this application, which is confirmed, may run from now on.
 fn note<F: Flash>(flash: &mut F, target: &Target, header: &Header) {
     // If this fails, the next start tries again.
-    let _ = target.security().note(flash, header);
+    let _ = trial::close(flash, &target.layout).and_then(|()| target.security().note(flash, header));
 }
 
 /// The header of the application, if the application is complete, is for this node, and its signature is or was

@@ -104,7 +104,7 @@ mod tests {
 
     fn header(counter: u32, key: u8, revokes: u8) -> Header {
         let about =
-            Description { product: 1, hardware: 1, version: Version::default(), counter, key, revokes };
+            Description { board: 1, hardware: 1, version: Version::default(), counter, key, revokes };
         Header::describe(about, &[0; 4]).unwrap()
     }
 

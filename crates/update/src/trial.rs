@@ -1,9 +1,10 @@
 //! The trial of a new image: the previous image is kept until the new one is confirmed, and is restored if the new one
 //! fails.
 //!
-//! The trial is open from the end of the copy (the commit record of staging is *done*) for as long as the record of the
-//! kept image is *pending*; confirming means to program *done* there. The marks of the trial are in front of the commit
-//! record of staging, and an update erases them together with staging:
+//! The record of the kept image decides. While it is *pending*, the confirmed program is the kept one, and the program in
+//! the application area is on trial. Only two things end that: a confirmation, which programs *done* there, and the
+//! return, which does so after the copy of the kept image. An update does not begin before: staging holds the image on
+//! trial and the marks of the trial, in front of the commit record:
 //!
 //! | mark | set |
 //! |---|---|
@@ -13,8 +14,9 @@
 //! Mark 3 is also set before the previous image is restored, so that marks which a cut left half programmed no longer
 //! matter.
 //!
-//! The trial is lost with mark 3, or with all of the marks 0 to 2. A mark is a word of zeros, like those of the record.
-//! The trial concerns one image only: an application that a debugger has written since is not on trial.
+//! The trial is lost with mark 3, or with all of the marks 0 to 2, or if staging holds no image that could be on trial. A
+//! mark is a word of zeros, like those of the record. The trial concerns one image only: an application that a debugger
+//! has written since is not on trial, and its first start closes the record of the kept image.
 
 use core::ops::Range;
 
@@ -22,6 +24,7 @@ use crate::area::{Area, Layout};
 use crate::crashes::Crashes;
 use crate::flash::Flash;
 use crate::header::HEADER;
+use crate::image;
 use crate::record::{Commit, RECORD_ROOM, Record, is_zero, mark};
 use crate::refusal::Refusal;
 
@@ -60,12 +63,13 @@ impl Trial {
     pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Trial {
         let (staged, kept) = (staged(layout).read(flash), kept(layout).read(flash));
         let image = if staged == Commit::None { layout.kept() } else { layout.staging() };
-        let is_in_place = crc(flash, layout.application()) == crc(flash, image);
+        let is_another = is_another(flash, layout.application(), image);
         match (staged, kept, reason(flash, layout)) {
+            (Commit::Done, Commit::Pending, None) if is_another => Trial::None,
+            (Commit::Done, Commit::Pending, None) => Trial::Open,
             // In this state the application may be half copied.
-            (Commit::Done, Commit::Pending, Some(reason)) => Trial::Lost(reason),
-            (Commit::Done, Commit::Pending, None) if is_in_place => Trial::Open,
-            (Commit::None, _, Some(reason)) if is_in_place => Trial::Over(reason),
+            (_, Commit::Pending, reason) => Trial::Lost(reason.unwrap_or(Reason::Withdrawn)),
+            (Commit::None, _, Some(reason)) if !is_another => Trial::Over(reason),
             _ => Trial::None,
         }
     }
@@ -82,6 +86,11 @@ impl Trial {
     /// [`Refusal::Write`], [`Refusal::Unspecified`].
     pub fn confirm<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
         kept(layout).done(flash)
+    }
+
+    /// Whether the application is or may be on trial: its fate is not decided yet.
+    pub(crate) fn is_undecided(self) -> bool {
+        matches!(self, Trial::Open | Trial::Lost(_))
     }
 
     /// Withdraws the trial: the previous image is restored at the next start.
@@ -103,11 +112,18 @@ pub(crate) fn kept(layout: &Layout) -> Record {
     Record(layout.kept().end())
 }
 
-/// The CRC of the header in this area, which identifies an image. Zeros for a flash that cannot be read.
-fn crc<F: Flash>(flash: &mut F, area: Area) -> [u8; 4] {
+/// Closes the record of a kept image that is pending without a trial.
+pub(crate) fn close<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+    let record = kept(layout);
+    if record.read(flash) == Commit::Pending { record.done(flash) } else { Ok(()) }
+}
+
+/// Whether the application has a header, but not that of the image in `area`. Without a header it is damaged, or half
+/// copied.
+fn is_another<F: Flash>(flash: &mut F, application: Area, area: Area) -> bool {
     let mut crc = [0; 4];
-    let _ = flash.read(area.start().saturating_add(HEADER - 4), &mut crc);
-    crc
+    let is_read = flash.read(area.start().saturating_add(HEADER - 4), &mut crc).is_ok();
+    is_read && image::header(flash, application).is_ok_and(|header| header.crc().to_le_bytes() != crc)
 }
 
 /// Counts an unrequested start.

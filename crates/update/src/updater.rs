@@ -135,10 +135,16 @@ impl<F: Flash> Updater<F> {
     /// yet, is lost; the application is unchanged.
     ///
     /// # Errors
+    /// [`Refusal::OnTrial`] while the application is on trial, because staging holds its marks;
     /// [`Refusal::Unspecified`] while the machine is busy; [`Refusal::Write`].
     pub fn clear(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
-        let outcome = self.staged().revoke(&mut self.flash);
+        let (flash, layout) = (&mut self.flash, &self.target.layout);
+        if Trial::read(flash, layout).is_undecided() {
+            return self.refuse(Refusal::OnTrial);
+        }
+        // There is no trial: a record of the kept image that a cut has left pending must not make one later.
+        let outcome = trial::kept(layout).done(flash).and_then(|()| trial::staged(layout).revoke(flash));
         self.state = State::Clearing(Erase::new(self.target.layout.staging()));
         self.settle(outcome)
     }
@@ -234,16 +240,26 @@ impl<F: Flash> Updater<F> {
 
     /// Does one step of the operation in progress, if any. Returns the kind of the next poll.
     pub fn poll(&mut self) -> Next {
-        let keeps = matches!(self.state, State::Erasing(.., Plan::Keep) | State::Copying(_, Plan::Keep));
+        let plan = if let State::Erasing(.., plan) | State::Copying(_, plan) = self.state { Some(plan) } else { None };
         if let Err(refusal) = self.step() {
-            if keeps {
-                // The application is still complete and stays: the next start must not try the staged image again.
+            if self.has_a_way_back(plan) {
+                // The next start must not try the staged image again.
                 let _ = self.staged().revoke(&mut self.flash);
             }
             // The caller can read the result in the status.
             let _ = self.settle(Err(refusal));
         }
         self.next()
+    }
+
+    /// Whether the previous program is there after a copy that has failed: as the application while it is being kept, as
+    /// the kept image afterwards.
+    fn has_a_way_back(&mut self, plan: Option<Plan>) -> bool {
+        match plan {
+            Some(Plan::Keep) => true,
+            Some(Plan::Install) => self.kept().read(&mut self.flash) == Commit::Pending,
+            _ => false,
+        }
     }
 
     fn staged(&self) -> Record {
@@ -361,8 +377,7 @@ impl<F: Flash> Updater<F> {
                 return self.install_staged();
             }
             Plan::Revert => {
-                // Without the record of staging there is no trial. A record of the kept image that stays open does no
-                // harm.
+                // A cut before the record of the kept image is closed repeats the copy.
                 self.staged().revoke(&mut self.flash)?;
                 self.kept().done(&mut self.flash)?;
             }
