@@ -44,7 +44,7 @@ pub enum Decision {
     /// A checked image waits in staging: call [`crate::Updater::install`], then ask again. If the answer is the same
     /// again, the copy has failed: stay with [`crate::Updater::status`].
     Copy,
-    /// The application has lost its trial: call [`crate::Updater::revert`], then ask again.
+    /// The application has lost its trial, or has not been restored completely: call [`crate::Updater::revert`], then ask again.
     Revert,
     /// Stay in the bootloader.
     Stay(Stay),
@@ -97,11 +97,12 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
     if !is_on_trial {
         note_proven(flash, target, start.proof);
     }
-    if commit == Commit::Pending {
-        return Decision::Copy;
-    }
     if let Trial::Lost(_) = trial {
         return Decision::Revert;
+    }
+    let has_failed = trial::has_failed(flash, &target.layout);
+    if commit == Commit::Pending && !has_failed {
+        return Decision::Copy;
     }
     if start.stay {
         return Decision::Stay(Stay::Asked);
@@ -116,6 +117,8 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
             }
             Decision::Start(header)
         }
+        // A cut at the end of the return may have repeated it.
+        Err(_) if has_failed => Decision::Revert,
         // A cut while the copy was marked as done may have left a mark that read as not programmed, so the copy began
         // again. Now the mark reads as programmed, but its image is still in staging.
         Err(_) if commit == Commit::Done => Decision::Copy,

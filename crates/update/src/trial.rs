@@ -3,19 +3,19 @@
 //!
 //! The record of the kept image decides. While it is *pending*, the confirmed program is the kept one, and the program in
 //! the application area is on trial. Only two things end that: a confirmation, which programs *done* there, and the
-//! return, which does so after the copy of the kept image. An update does not begin before: staging holds the image on
-//! trial and the marks of the trial, in front of the commit record:
+//! return, which does so after the copy of the kept image. The next update begins afterwards: until then staging holds
+//! the image on trial and, in front of the commit record, the marks of the trial:
 //!
 //! | mark | set |
 //! |---|---|
 //! | 0 to 2 | at each unrequested start: after a crash, the watchdog, or power-on |
 //! | 3 | when the trial is withdrawn: no confirmation in time, or the command of a master |
 //!
-//! Mark 3 is also set before the previous image is restored, so that marks which a cut left half programmed no longer
-//! matter.
+//! The trial is lost with mark 3, or with all of the marks 0 to 2. From then on the staged image is never copied again,
+//! and an application that is not whole is restored from the kept image, whatever the records read after a cut. Mark 3
+//! is also set before the previous image is restored, so that marks which a cut left half programmed no longer matter.
 //!
-//! The trial is lost with mark 3, or with all of the marks 0 to 2, or if staging holds no image that could be on trial. A
-//! mark is a word of zeros, like those of the record. The trial concerns one image only: an application that a debugger
+//! A mark is a word of zeros, like those of the record. The trial concerns one image only: an application that a debugger
 //! has written since is not on trial, and its first start closes the record of the kept image.
 
 use core::ops::Range;
@@ -41,6 +41,8 @@ pub enum Trial {
     /// No trial: the application was confirmed, or there is no image to restore.
     #[default]
     None,
+    /// The new image is being copied, and the previous one is kept.
+    Begun,
     /// The application has to be confirmed.
     Open,
     /// The previous image has to be restored.
@@ -62,14 +64,12 @@ impl Trial {
     /// Reads the state of the trial.
     pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Trial {
         let (staged, kept) = (staged(layout).read(flash), kept(layout).read(flash));
-        let image = if staged == Commit::None { layout.kept() } else { layout.staging() };
-        let is_another = is_another(flash, layout.application(), image);
         match (staged, kept, reason(flash, layout)) {
-            (Commit::Done, Commit::Pending, None) if is_another => Trial::None,
-            (Commit::Done, Commit::Pending, None) => Trial::Open,
             // In this state the application may be half copied.
-            (_, Commit::Pending, reason) => Trial::Lost(reason.unwrap_or(Reason::Withdrawn)),
-            (Commit::None, _, Some(reason)) if !is_another => Trial::Over(reason),
+            (_, Commit::Pending, Some(reason)) => Trial::Lost(reason),
+            (_, Commit::Done, Some(reason)) if !is_another(flash, layout, layout.kept()) => Trial::Over(reason),
+            (Commit::Pending, Commit::Pending, None) => Trial::Begun,
+            (Commit::Done, Commit::Pending, None) if !is_another(flash, layout, layout.staging()) => Trial::Open,
             _ => Trial::None,
         }
     }
@@ -83,22 +83,27 @@ impl Trial {
     /// Confirms the application. Repeated calls do no harm.
     ///
     /// # Errors
-    /// [`Refusal::Write`], [`Refusal::Unspecified`].
+    /// [`Refusal::Write`]; [`Refusal::Unspecified`] if the trial is lost.
     pub fn confirm<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+        if reason(flash, layout).is_some() {
+            return Err(Refusal::Unspecified);
+        }
+        // A cut may have left a mark that reads as set now and not later: the image would be copied once more.
+        staged(layout).done(flash)?;
         kept(layout).done(flash)
     }
 
-    /// Whether the application is or may be on trial: its fate is not decided yet.
-    pub(crate) fn is_undecided(self) -> bool {
-        matches!(self, Trial::Open | Trial::Lost(_))
-    }
-
-    /// Withdraws the trial: the previous image is restored at the next start.
+    /// Withdraws the trial: the previous image is restored at the next start. Does nothing to a confirmed application.
     ///
     /// # Errors
     /// [`Refusal::Write`], [`Refusal::Unspecified`].
     pub fn withdraw<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
-        mark(flash, place(layout, WITHDRAWN))
+        if kept(layout).read(flash) == Commit::Pending { fail(flash, layout) } else { Ok(()) }
+    }
+
+    /// Whether the application is or may be on trial: neither it nor the kept image is confirmed for good.
+    pub(crate) fn is_undecided(self) -> bool {
+        matches!(self, Trial::Begun | Trial::Open | Trial::Lost(_))
     }
 }
 
@@ -118,12 +123,24 @@ pub(crate) fn close<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refu
     if record.read(flash) == Commit::Pending { record.done(flash) } else { Ok(()) }
 }
 
+/// Loses the trial for good, before the application is touched.
+pub(crate) fn fail<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+    mark(flash, place(layout, WITHDRAWN))
+}
+
+/// Whether the trial was lost and there is a kept image: the staged image must not be copied again.
+pub(crate) fn has_failed<F: Flash>(flash: &mut F, layout: &Layout) -> bool {
+    let is_kept = matches!(kept(layout).read(flash), Commit::Pending | Commit::Done);
+    is_kept && reason(flash, layout).is_some()
+}
+
 /// Whether the application has a header, but not that of the image in `area`. Without a header it is damaged, or half
 /// copied.
-fn is_another<F: Flash>(flash: &mut F, application: Area, area: Area) -> bool {
+fn is_another<F: Flash>(flash: &mut F, layout: &Layout, area: Area) -> bool {
     let mut crc = [0; 4];
     let is_read = flash.read(area.start().saturating_add(HEADER - 4), &mut crc).is_ok();
-    is_read && image::header(flash, application).is_ok_and(|header| header.crc().to_le_bytes() != crc)
+    let application = image::header(flash, layout.application());
+    is_read && application.is_ok_and(|header| header.crc().to_le_bytes() != crc)
 }
 
 /// Counts an unrequested start.

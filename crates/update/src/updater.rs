@@ -209,18 +209,17 @@ impl<F: Flash> Updater<F> {
     }
 
     /// Copies the kept image back to the application area, after checking it, because the application has lost its
-    /// trial ([`crate::Decision::Revert`]). If the kept image is not valid, the trial ends without it.
+    /// trial or was not restored completely ([`crate::Decision::Revert`]). If the kept image is not valid, the trial ends without it.
     ///
     /// # Errors
     /// [`Refusal::Unspecified`] if no trial is lost, or while busy; the reason why the kept image is refused.
     pub fn revert(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
         let layout = &self.target.layout;
-        if !matches!(Trial::read(&mut self.flash, layout), Trial::Lost(_)) {
+        if !trial::has_failed(&mut self.flash, layout) {
             return Err(Refusal::Unspecified);
         }
-        // The loss of the trial must be final before the application is touched.
-        Trial::withdraw(&mut self.flash, layout)?;
+        trial::fail(&mut self.flash, layout)?;
         let kept = layout.kept();
         let header = image::admitted(&mut self.flash, &self.target, kept);
         self.check(Plan::Revert, header.map(|header| FullCheck::of(header, kept)))
@@ -242,9 +241,9 @@ impl<F: Flash> Updater<F> {
     pub fn poll(&mut self) -> Next {
         let plan = if let State::Erasing(.., plan) | State::Copying(_, plan) = self.state { Some(plan) } else { None };
         if let Err(refusal) = self.step() {
-            if self.has_a_way_back(plan) {
+            if plan == Some(Plan::Keep) || plan == Some(Plan::Install) && self.has_kept() {
                 // The next start must not try the staged image again.
-                let _ = self.staged().revoke(&mut self.flash);
+                let _ = self.abandon();
             }
             // The caller can read the result in the status.
             let _ = self.settle(Err(refusal));
@@ -252,13 +251,18 @@ impl<F: Flash> Updater<F> {
         self.next()
     }
 
-    /// Whether the previous program is there after a copy that has failed: as the application while it is being kept, as
-    /// the kept image afterwards.
-    fn has_a_way_back(&mut self, plan: Option<Plan>) -> bool {
-        match plan {
-            Some(Plan::Keep) => true,
-            Some(Plan::Install) => self.kept().read(&mut self.flash) == Commit::Pending,
-            _ => false,
+    /// Whether the previous program is the kept image, because the application area is being replaced.
+    fn has_kept(&mut self) -> bool {
+        self.kept().read(&mut self.flash) == Commit::Pending
+    }
+
+    /// Gives up the staged image for good. If the previous program is kept, it is restored at the next start.
+    fn abandon(&mut self) -> Result<(), Refusal> {
+        if self.has_kept() {
+            trial::fail(&mut self.flash, &self.target.layout)?;
+            self.staged().done(&mut self.flash)
+        } else {
+            self.staged().revoke(&mut self.flash)
         }
     }
 
@@ -353,7 +357,7 @@ impl<F: Flash> Updater<F> {
     /// this application if the copy was cut.
     fn keep(&mut self, staged: Header) -> Result<(), Refusal> {
         let application = self.target.layout.application();
-        if self.kept().read(&mut self.flash) == Commit::Pending {
+        if self.has_kept() {
             self.kept().close(&mut self.flash)?;
         } else if let Ok(header) = image::header(&mut self.flash, application) {
             self.state = State::Checking(FullCheck::of_sum(header, application), Plan::Keep);
@@ -376,11 +380,7 @@ impl<F: Flash> Updater<F> {
                 self.kept().write(&mut self.flash)?;
                 return self.install_staged();
             }
-            Plan::Revert => {
-                // A cut before the record of the kept image is closed repeats the copy.
-                self.staged().revoke(&mut self.flash)?;
-                self.kept().done(&mut self.flash)?;
-            }
+            Plan::Revert => self.kept().done(&mut self.flash)?,
             Plan::Commit | Plan::Install => self.staged().done(&mut self.flash)?,
         }
         self.state = State::Installed;
@@ -398,10 +398,11 @@ impl<F: Flash> Updater<F> {
     fn give_up(&mut self, plan: Plan, refusal: Refusal) -> Result<(), Refusal> {
         match plan {
             Plan::Commit => {}
-            Plan::Install => self.staged().revoke(&mut self.flash)?,
+            Plan::Install => self.abandon()?,
             // The application is not valid, so it cannot be kept.
             Plan::Keep => return self.install_staged(),
-            Plan::Revert => self.kept().done(&mut self.flash)?,
+            // There is no way back: the staged image is the only one.
+            Plan::Revert => self.kept().revoke(&mut self.flash)?,
         }
         Err(refusal)
     }

@@ -330,7 +330,7 @@ impl Node {
             None => {
                 assert_eq!(number, self.model.confirmed, "{}", self.told());
                 let trial = Trial::read(&mut self.flash, &target().layout);
-                assert!(!matches!(trial, Trial::Open | Trial::Lost(_)), "{trial:?}: {}", self.told());
+                assert!(!matches!(trial, Trial::Begun | Trial::Open | Trial::Lost(_)), "{trial:?}: {}", self.told());
             }
         }
         if self.model.on_trial.is_none() {
