@@ -47,7 +47,7 @@ impl ProgramTrial {
     fn state(&self) -> u8 {
         match self.state {
             Trial::None => 0,
-            Trial::Open | Trial::Lost(_) => 1,
+            Trial::Begun | Trial::Open | Trial::Lost(_) => 1,
             Trial::Over(Reason::Starts) => 2,
             Trial::Over(Reason::Withdrawn) => 3,
         }

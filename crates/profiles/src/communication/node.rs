@@ -57,6 +57,15 @@ pub const PROGRAM_AUTHORISATION_ROWS: &[Object] = &[
     Object::new(PROGRAM_AUTHORISATION, 3, "Response", Type::Unsigned64, Access::WriteOnly).handled(),
 ];
 
+/// Index of the object about the programs of the node.
+pub const PROGRAM_STATE: u16 = 0x2004;
+
+/// 2004h: facts about the board and its programs, for the master of an update.
+pub const PROGRAM_STATE_ROWS: &[Object] = &[
+    Object::highest(PROGRAM_STATE, 1, "Program state"),
+    Object::new(PROGRAM_STATE, 1, "Board", Type::Unsigned32, Access::Const).value(product::BOARD as i64),
+];
+
 /// Index of the object that counts lost events.
 pub const LOST_EVENTS: u16 = 0x2001;
 

@@ -164,7 +164,7 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
         update::Error::Flash { .. } | update::Error::Identification { .. } => 5,
-        update::Error::Product { .. } | update::Error::Older { .. } => 6,
+        update::Error::Board { .. } | update::Error::Older { .. } => 6,
     }
 }
 

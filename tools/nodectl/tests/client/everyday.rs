@@ -101,7 +101,8 @@ fn deaf(id: u16, data: &[u8]) -> Wire<Deaf> {
     Wire::new(Deaf(Frame::new(id, data).expect("a frame"), Instant(0)))
 }
 
-const COMMANDS: [&[&str]; 5] = [&["info"], &["read", "1000"], &["monitor"], &["dump"], &["write", "1017", "1"]];
+const COMMANDS: [&[&str]; 5] =
+    [&["info"], &["read", "1000"], &["monitor"], &["dump"], &["write", "1017", "1"]];
 
 #[test]
 fn every_command_says_what_to_do_about_a_silent_node() {
@@ -109,7 +110,10 @@ fn every_command_says_what_to_do_about_a_silent_node() {
         let wire = Wire::new(vec![Pressure::new(1)]);
         let (code, text) = failed(&wire, &[line, &["-n", "9"]].concat());
         assert_eq!(code, 3);
-        assert!(text.contains("nothing is heard of node 9: is it on") && text.contains("nodectl scan"), "{text}");
+        assert!(
+            text.contains("nothing is heard of node 9: is it on") && text.contains("nodectl scan"),
+            "{text}"
+        );
     }
 }
 

@@ -192,7 +192,9 @@ fn work(
     let network = network.map_err(|error| Refusal::new(error.to_string()))?;
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
     if let Some(Known { node, channel, catalogue }) = known {
-        session.network.set_channel(node, Some(channel).filter(|channel| *channel != Channel::default_of(node)));
+        session
+            .network
+            .set_channel(node, Some(channel).filter(|channel| *channel != Channel::default_of(node)));
         session.know(node, catalogue);
     }
     let mut context = Context { session, orders: orders.clone(), number };
