@@ -1,6 +1,6 @@
 //! The task of the parameter memory, at the lowest priority: it carries out the store jobs of the protocol. The flash
 //! stops the core for 16 us with every word, so all other tasks run between two words. The erase of a page stops the core
-//! for 0.25 s, so a page is erased only while nobody misses the node.
+//! for 0.25 s, so a page is erased only while that disturbs no service.
 
 use bsp::update_layout::LAYOUT;
 use bsp::{Clock, ParameterFlash, Watchdog, retained};
@@ -115,7 +115,7 @@ impl StorageTask {
         rtic::pend(SERVICES);
     }
 
-    /// Erases the page that is not in use, if that has to be done, nobody misses the node meanwhile, and no frame waits.
+    /// Erases the page that is not in use, if it is used up, a pause disturbs no service, and no frame waits.
     pub(crate) fn make_room(&mut self, node: &mut impl Shared, watchdog: &Watchdog) {
         let now = Clock::now();
         let Some(memory) = &mut self.memory else { return };

@@ -150,7 +150,7 @@ pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &m
     }
 }
 
-/// Erases a page if one has to be erased and nobody misses the node meanwhile, and reports the state of the memory.
+/// Erases a page if one is used up and a pause disturbs no service, and reports the state of the memory.
 pub fn keep_room<F: NorFlash>(protocol: &mut Protocol, store: &mut ParameterMemory<F>, now: Instant) {
     if store.can_make_room(now) && protocol.can_pause(ERASE, now) {
         let _ = store.make_room();

@@ -63,13 +63,13 @@ impl EraseBudget {
     const MINUTES: u16 = 10;
     const FULL: u16 = Self::BURST * Self::MINUTES;
 
-    /// The budget at a start: what the run before has left, or all of it after a loss of power.
+    /// The budget at a start: the [`word`](EraseBudget::word) of the run before; `None` after a loss of power.
     #[must_use]
     pub fn new(left: Option<u16>) -> EraseBudget {
         EraseBudget { minutes: left.unwrap_or(Self::FULL).min(Self::FULL), counted: Instant(0) }
     }
 
-    /// What the next start needs.
+    /// The state of the budget, for the next start.
     #[must_use]
     pub fn word(&self) -> u16 {
         self.minutes
@@ -178,7 +178,7 @@ impl Protocol {
         self.device.show(|application, image| application.show_memory(image));
     }
 
-    /// Whether nobody misses the node for `span`, which an erase needs: see [`canopen::Device::can_pause`].
+    /// Whether an erase that stops the node for `span` disturbs no service: see [`canopen::Device::can_pause`].
     #[must_use]
     pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
         self.device.can_pause(span, now)
@@ -224,7 +224,7 @@ mod tests {
 
     /// The figures of docs/safety.md.
     #[test]
-    fn the_memory_lasts_for_months_of_requests_that_wear_it_out() {
+    fn the_memory_lasts_for_138_days_of_saves_in_a_loop() {
         let erases = 2 * 10_000;
         let hours = u64::from(erases - u32::from(EraseBudget::BURST)) * EraseBudget::INTERVAL.0 / HOUR;
         assert_eq!((hours, hours / 24), (3330, 138));

@@ -39,9 +39,8 @@ impl<F: NorFlash> Store<F> {
 
     /// Makes the store ready for saving with at most this many erases: erases the page that is not in use, unless it is
     /// erased already. If the page in use was cut or damaged, its readable data is first moved to the other page.
-    /// Nothing is therefore ever appended to doubtful words, and the values read at this start are final. Without an
-    /// erase that is needed, a page that was cut stays as it is and the store may be [full](Error::Full), until
-    /// [`make_room`](Store::make_room).
+    /// Nothing is therefore ever appended to doubtful words, and the values read at this start are final. If `erases` is too
+    /// small, the store can be [full](Error::Full) until [`make_room`](Store::make_room).
     ///
     /// To be called at start-up, before the node goes on the bus: an erase of 16 KiB stops a single-bank flash for
     /// 0.25 s, and there can be two. Most starts erase nothing.

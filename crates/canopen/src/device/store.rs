@@ -108,7 +108,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Device<A, N, T, R, W, M>
 {
-    /// Whether nobody misses the device for `span`, for example while the erase of a flash page stops the core. The
+    /// Whether a pause of `span` disturbs no service, for example while the erase of a flash page stops the core. The
     /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
     /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and no heartbeat of another node (1016h) is
     /// due.
