@@ -20,6 +20,7 @@ mod replacement;
 mod scan;
 mod serve;
 mod session;
+mod sheets;
 mod store;
 mod trace;
 mod update;

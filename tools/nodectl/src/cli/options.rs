@@ -27,7 +27,8 @@ pub struct Options {
     #[arg(long, short, global = true, env = "NODECTL_NODE", default_value = "1")]
     pub node: NodeSet,
 
-    /// Data sheet of the node; else the one of this project with its vendor-ID and product code.
+    /// Data sheet of the node, or a folder of data sheets from which each node gets the one with its vendor-ID and product
+    /// code; else the one of this project.
     #[arg(long, global = true, value_name = "FILE")]
     pub eds: Option<PathBuf>,
 

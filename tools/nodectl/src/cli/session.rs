@@ -13,6 +13,7 @@ use eds::Eds;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
+use super::sheets::{Device, Sheets, misfit};
 use super::{Failure, Options, Output};
 use crate::bus::NoBus;
 use crate::configuration::Configuration;
@@ -38,8 +39,11 @@ pub struct Session {
     pub(super) network: Network,
     pub(super) options: Options,
     pub(super) output: Output,
-    /// The data sheet of the options, once it has been read.
-    sheet: Option<Eds>,
+    /// The data sheets of the options, once they have been read.
+    sheets: Option<Sheets>,
+    /// Whether a data sheet is used only for a node whose identity it has: there are many nodes, of which the user has
+    /// named none.
+    pub(super) has_many_nodes: bool,
     catalogues: BTreeMap<NodeId, Arc<Catalogue>>,
     /// The deadline of all transfers that belong together.
     deadline: Instant,
@@ -52,12 +56,12 @@ impl Session {
     /// The bus cannot be opened.
     pub fn open(options: &Options, output: Output) -> Result<Session, Failure> {
         // Read the data sheet first, so that a wrong one is reported before the bus is opened.
-        let sheet = options.eds.as_deref().map(sheet).transpose()?;
+        let sheets = Some(Sheets::read(options.eds.as_deref())?);
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
         let mut network = Network::open(move || address.open(bit_rate))?;
         // Another client's transfer may run already.
         network.pause(LISTEN)?;
-        Ok(Session { sheet, ..Session::with(network, options, output) })
+        Ok(Session { sheets, ..Session::with(network, options, output) })
     }
 
     /// A session without a bus, for a command that works on files.
@@ -65,9 +69,9 @@ impl Session {
     /// # Errors
     /// The data sheet of the options cannot be used.
     pub fn without_a_bus(options: &Options, output: Output) -> Result<Session, Failure> {
-        let sheet = options.eds.as_deref().map(sheet).transpose()?;
+        let sheets = Some(Sheets::read(options.eds.as_deref())?);
         let network = Network::open(|| Ok(Box::new(NoBus)))?;
-        Ok(Session { sheet, ..Session::with(network, options, output) })
+        Ok(Session { sheets, ..Session::with(network, options, output) })
     }
 
     /// A session on an open bus.
@@ -77,7 +81,8 @@ impl Session {
             network,
             options: options.clone(),
             output,
-            sheet: None,
+            sheets: None,
+            has_many_nodes: false,
             catalogues: BTreeMap::new(),
             deadline: Instant::NEVER,
         }
@@ -101,18 +106,21 @@ impl Session {
         self.deadline = self.network.now() + limit;
     }
 
+    /// The data sheets of the options.
+    pub(super) fn sheets(&mut self) -> Result<&Sheets, Failure> {
+        if self.sheets.is_none() {
+            self.sheets = Some(Sheets::read(self.options.eds.as_deref())?);
+        }
+        Ok(self.sheets.get_or_insert_default())
+    }
+
     /// The catalogue of a node: the data sheet of the options, else the built-in data sheet for its identity.
     pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Arc<Catalogue>, Failure> {
         if let Some(known) = self.catalogues.get(&node) {
             return Ok(Arc::clone(known));
         }
-        if self.sheet.is_none() {
-            self.sheet = self.options.eds.as_deref().map(sheet).transpose()?;
-        }
-        let catalogue = match self.sheet.clone() {
-            Some(sheet) => Catalogue::new(sheet),
-            None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
-        };
+        let device = self.device(node)?;
+        let catalogue = self.catalogue_of(node, device)?;
         self.choose_channel(node, &catalogue)?;
         Ok(Arc::clone(self.catalogues.entry(node).or_insert(Arc::new(catalogue))))
     }
@@ -176,9 +184,25 @@ impl Session {
         values.map_err(|error| self.named(error))
     }
 
-    fn identify(&mut self, node: NodeId) -> Result<Option<Catalogue>, Failure> {
-        let (vendor, product) = (self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?);
-        Ok(vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)))
+    /// Vendor-ID and product code of a node.
+    fn device(&mut self, node: NodeId) -> Result<Device, Failure> {
+        Ok((self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?))
+    }
+
+    /// The catalogue of a node with this identity. A file that the user has named for one node is used for it, and the
+    /// user is told when it is for another device.
+    pub(super) fn catalogue_of(&mut self, node: NodeId, device: Device) -> Result<Catalogue, Failure> {
+        let is_for_all = !self.has_many_nodes;
+        let sheets = self.sheets()?;
+        if let Some(sheet) = sheets.of(device) {
+            return Ok(Catalogue::new(sheet.clone()));
+        }
+        if let Some(sheet) = sheets.file().filter(|_| is_for_all) {
+            note(format_args!("node {}: {}", node.get(), misfit(sheet, device)));
+            return Ok(Catalogue::new(sheet.clone()));
+        }
+        let built_in = device.0.zip(device.1).and_then(|(vendor, product)| Catalogue::built_in(vendor, product));
+        Ok(built_in.unwrap_or_else(Catalogue::unknown))
     }
 
     /// The value of an UNSIGNED32 object; `None` where the node has no such object.

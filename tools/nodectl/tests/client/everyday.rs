@@ -224,3 +224,24 @@ fn the_standard_output_is_a_file_of_a_recording() {
     let (code, text) = failed(&wire, &["record", "--for", "1", "--csv", "-", "--arrow", "-"]);
     assert_eq!((code, text.as_str()), (2, "the standard output takes one of the files"));
 }
+
+/// A folder of data sheets is for many kinds of nodes: each gets the one of its identity.
+#[test]
+fn each_node_gets_the_data_sheet_of_its_identity() {
+    let folder = path("sheets");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let (code, text) = failed(&Wire::new(Pressure::new(1)), &["read", "1000", "--eds", &folder]);
+    assert!(code == 7 && text.ends_with("there is no data sheet in this folder"), "{text}");
+    for device in &eds::DEVICES {
+        let text = device.sheet(&eds::Edition::default());
+        let other = text.replace("ParameterName=Producer heartbeat time", &format!("ParameterName=Beat of {}", device.file_name));
+        std::fs::write(format!("{folder}/{}", device.file_name), other).expect("a file");
+    }
+    std::fs::write(format!("{folder}/broken.eds"), "[1000]\nObjectType=9999\n").expect("a file");
+    for device in &eds::DEVICES {
+        let wire = Wire::new(Pressure::of(device.personality, 1));
+        let lines = printed(&wire, &["read", "1017", "--eds", &folder]);
+        assert!(lines.contains(&format!("Beat of {}", device.file_name)), "{lines}");
+    }
+}

@@ -31,6 +31,8 @@ pub(super) struct Identity {
     pub(super) serial: Option<u32>,
     pub(super) version: Option<String>,
     pub(super) hardware: Option<String>,
+    /// Why the data sheet that the user has named is not used for the node.
+    pub(super) note: Option<String>,
 }
 
 impl Identity {

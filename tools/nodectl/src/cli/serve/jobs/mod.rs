@@ -191,6 +191,7 @@ fn work(
     let network = Network::open(move || Ok(port::open(&for_port, interest)));
     let network = network.map_err(|error| Refusal::new(error.to_string()))?;
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
+    session.has_many_nodes = true;
     if let Some(Known { node, channel, catalogue }) = known {
         session
             .network
