@@ -201,7 +201,8 @@ impl Session {
             note(format_args!("node {}: {}", node.get(), misfit(sheet, device)));
             return Ok(Catalogue::new(sheet.clone()));
         }
-        let built_in = device.0.zip(device.1).and_then(|(vendor, product)| Catalogue::built_in(vendor, product));
+        let built_in =
+            device.0.zip(device.1).and_then(|(vendor, product)| Catalogue::built_in(vendor, product));
         Ok(built_in.unwrap_or_else(Catalogue::unknown))
     }
 

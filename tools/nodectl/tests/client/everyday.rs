@@ -235,7 +235,10 @@ fn each_node_gets_the_data_sheet_of_its_identity() {
     assert!(code == 7 && text.ends_with("there is no data sheet in this folder"), "{text}");
     for device in &eds::DEVICES {
         let text = device.sheet(&eds::Edition::default());
-        let other = text.replace("ParameterName=Producer heartbeat time", &format!("ParameterName=Beat of {}", device.file_name));
+        let other = text.replace(
+            "ParameterName=Producer heartbeat time",
+            &format!("ParameterName=Beat of {}", device.file_name),
+        );
         std::fs::write(format!("{folder}/{}", device.file_name), other).expect("a file");
     }
     std::fs::write(format!("{folder}/broken.eds"), "[1000]\nObjectType=9999\n").expect("a file");
