@@ -11,3 +11,4 @@ pub mod sdo;
 pub mod station;
 pub mod tables;
 pub mod thorough;
+pub mod watch;

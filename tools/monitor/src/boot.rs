@@ -40,14 +40,15 @@ impl Boot {
         self.since.is_some()
     }
 
-    /// A boot-up message. `sees_start`: every boot-up of the node is seen.
-    pub(crate) fn boot_up(&mut self, findings: &mut Findings) {
+    /// A boot-up message. Returns whether the restart was not seen before it.
+    pub(crate) fn boot_up(&mut self, is_injected: bool, findings: &mut Findings) -> bool {
         let is_first = !std::mem::replace(&mut self.has_booted, true);
         let has_reason = std::mem::take(&mut self.has_reason);
-        self.since = None;
-        if !(is_first || has_reason || self.is_updated) {
+        let was_seen = self.since.take().is_some();
+        if !(is_first || has_reason || self.is_updated || is_injected) {
             findings.push((Rule::UnexpectedReset, "a boot-up message without a command".to_owned()));
         }
+        !was_seen && !has_reason
     }
 
     /// Any other frame, which began at `start`; the frames that were being sent may still end.

@@ -10,6 +10,9 @@ const KEPT: usize = 8192;
 const BIT_RATES: [f64; 9] = [1e4, 2e4, 5e4, 1e5, 1.25e5, 2.5e5, 5e5, 8e5, 1e6];
 /// Longest gap in bits between two frames that follow each other without a pause.
 const GAP: f64 = 25.0;
+/// The same, with an error frame between the two, and with a frame that an error has destroyed.
+const ERROR_GAP: f64 = 80.0;
+const DESTROYED_GAP: f64 = 400.0;
 
 /// A frame that has passed.
 #[derive(Clone, Copy, Debug)]
@@ -86,10 +89,8 @@ impl Bus {
             self.bit = Bit::Seen(rate.max(1e6 * f64::from(bits(frame)) / span).min(1e6));
         }
         let start = end - f64::from(bits(frame) - 3) * self.bit();
-        let before = self.recent.back().filter(|last| start - last.end <= GAP * self.bit() + 1.0);
-        let is_repeated =
-            self.is_real() && before.is_some_and(|last| last.frame == *frame && last.device == device);
-        if before.is_none() {
+        let is_repeated = self.is_real() && self.is_repetition(start, frame, device);
+        if self.recent.back().is_none_or(|last| start - last.end > GAP * self.bit() + 1.0) {
             self.busy_since = start;
         }
         if self.recent.len() == KEPT {
@@ -97,6 +98,28 @@ impl Bus {
         }
         self.recent.push_back(Passed { start, end, at, frame: *frame, device });
         is_repeated
+    }
+
+    /// Whether the frame follows an equal one of its sender without a pause. Between the two of an SDO server, more
+    /// urgent frames may have passed.
+    fn is_repetition(&self, start: f64, frame: &Frame, device: Option<usize>) -> bool {
+        const FRAMES: usize = 64;
+        let is_sdo = (0x580..0x600).contains(&frame.id());
+        let (frames, gap) = if is_sdo { (FRAMES, DESTROYED_GAP) } else { (1, ERROR_GAP) };
+        let mut next = start;
+        for passed in self.recent.iter().rev().take(frames) {
+            if next - passed.end > gap * self.bit() + 1.0 {
+                return false;
+            }
+            if passed.device == device && passed.frame.id() == frame.id() {
+                return passed.frame == *frame;
+            }
+            if passed.frame.id() > frame.id() {
+                return false;
+            }
+            next = passed.start;
+        }
+        false
     }
 
     /// The time in us from the start of the unbroken traffic before the newest frame to its start: how long the frame

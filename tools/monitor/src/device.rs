@@ -38,6 +38,10 @@ pub(crate) struct Device {
     errors: Errors,
     pdos: Pdos,
     channel: Channel,
+    /// The requests before the boot-up message.
+    early: Vec<(u8, [u8; 8])>,
+    /// A value may be to be confirmed.
+    is_wishful: bool,
 }
 
 impl Device {
@@ -53,6 +57,8 @@ impl Device {
             errors: Errors::default(),
             pdos: Pdos::default(),
             channel: Channel::new(),
+            early: Vec::new(),
+            is_wishful: false,
         }
     }
 
@@ -84,6 +90,11 @@ impl Device {
         self.channel.give_up();
     }
 
+    /// The caller starts the node again.
+    pub(crate) fn may_restart(&mut self) {
+        self.boot.may_restart();
+    }
+
     /// LSS may change the node-ID or the bit rate.
     pub(crate) fn lss(&mut self) {
         self.boot.may_restart();
@@ -105,6 +116,33 @@ impl Device {
 
     pub(crate) fn is_injected(&self) -> bool {
         self.is_injected
+    }
+
+    pub(crate) fn resume(&mut self, now: Instant) {
+        self.heartbeat.resume(now);
+        self.channel.resume(now);
+        self.errors.resume(now);
+    }
+
+    /// The objects whose values decide a rule; empty while the SDO server is busy.
+    pub(crate) fn wishes(&mut self) -> Vec<Key> {
+        let is_served = self.nmt.state().is_some_and(State::has_services) && !self.boot.is_waiting();
+        if !is_served || !self.is_wishful {
+            return Vec::new();
+        }
+        if !self.channel.is_idle() {
+            return Vec::new();
+        }
+        self.is_wishful = false;
+        self.values.unconfirmed().collect()
+    }
+
+    /// Whether the value of an object before a download decides a rule, and the SDO server is free.
+    pub(crate) fn is_wanted_before(&self, key: Key) -> bool {
+        self.values.is_parameter(key)
+            && self.channel.is_idle()
+            && self.nmt.state().is_some_and(State::has_services)
+            && !self.boot.is_waiting()
     }
 
     /// Checks what should have happened by now.
@@ -141,8 +179,17 @@ impl Device {
         self.errors.advance(inhibit, now, findings);
     }
 
-    /// The SDO request of a client.
-    pub(crate) fn request(&mut self, data: &[u8], now: Instant) {
+    /// The SDO request of a client to the node with this node-ID. Before the boot-up message, the node may miss it.
+    pub(crate) fn request(&mut self, node: u8, data: &[u8], now: Instant) {
+        if self.id == Some(node) && !self.boot.is_waiting() {
+            self.take_request(data, now);
+        } else if self.id.is_none() || self.id == Some(node) {
+            self.early.extend(data.try_into().ok().map(|data| (node, data)));
+        }
+    }
+
+    fn take_request(&mut self, data: &[u8], now: Instant) {
+        self.is_wishful = true;
         if let Some(Event::Begins(key, value)) = self.channel.request(data, now) {
             self.values.begins(key, value.as_deref());
             if PROGRAM.contains(&key.0) {
@@ -222,16 +269,23 @@ impl Device {
     }
 
     fn boot_up(&mut self, at: Instant, findings: &mut Findings) {
-        if !self.is_injected {
-            self.boot.boot_up(findings);
-        }
-        self.is_injected = false;
-        if !self.boot.is_waiting() && self.nmt.state().is_some() {
+        if self.boot.boot_up(self.is_injected, findings) && self.nmt.state().is_some() {
             // A restart without a command that the monitor has seen.
             self.values.reset(Scope::All);
             self.pdos.restart();
+            self.nmt.restart();
         }
+        self.is_injected = false;
         self.channel.reset();
+        let id = self.id;
+        let early: Vec<_> = self.early.drain(..).filter(|(node, _)| Some(*node) == id).collect();
+        match early.as_slice() {
+            [] => (),
+            // The answer has no deadline.
+            [(_, request)] => self.take_request(request, Instant::NEVER),
+            _ => self.channel.give_up(),
+        }
+        self.is_wishful = true;
         let starts_itself = self.values.sure_number(0x1F80, 0).is_none_or(|start| start != 0);
         self.nmt.boot_up(starts_itself);
         self.errors.boot_up(self.values.sheet().is_some_and(|sheet| sheet.forgets_errors));

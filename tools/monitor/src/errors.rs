@@ -53,6 +53,11 @@ impl Errors {
         self.doubts.retain(|doubt| matches!(doubt.what, What::Register(_)));
     }
 
+    /// The time for an EMCY begins anew.
+    pub(crate) fn resume(&mut self, now: Instant) {
+        self.doubts.iter_mut().for_each(|doubt| doubt.at = now);
+    }
+
     /// The time of the last EMCY.
     pub(crate) fn last(&self) -> Option<Instant> {
         self.last

@@ -15,6 +15,11 @@ impl Heartbeat {
         (self.last, self.is_reported) = (Some(now), false);
     }
 
+    /// The time begins anew.
+    pub(crate) fn resume(&mut self, now: Instant) {
+        self.last = self.last.map(|_| now);
+    }
+
     /// The node sends no heartbeats for now: it restarts, or changes its bit rate.
     pub(crate) fn pause(&mut self) {
         self.last = None;

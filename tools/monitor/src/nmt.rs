@@ -55,8 +55,10 @@ impl Nmt {
         self.commands.push(Command { at: now, leads_to });
     }
 
+    /// A boot-up message. A command may have come before it.
     pub(crate) fn boot_up(&mut self, may_start: bool) {
-        *self = Nmt { shown: Some(State::PreOperational), may_start, ..Nmt::default() };
+        let commands = std::mem::take(&mut self.commands);
+        *self = Nmt { shown: Some(State::PreOperational), may_start, commands, ..Nmt::default() };
     }
 
     /// The node restarts.

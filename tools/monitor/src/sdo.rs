@@ -58,6 +58,8 @@ struct Transfer {
     crc: u16,
     /// The client allows another protocol for a small object.
     may_switch: bool,
+    /// The server has ended a block upload, and waits for the client's confirmation.
+    is_read: bool,
 }
 
 /// The end of a transfer.
@@ -97,7 +99,17 @@ impl Channel {
     pub(crate) fn overdue(&self, now: Instant) -> Option<(Key, Instant)> {
         let is_waiting = !matches!(self.expect, Expect::Nothing | Expect::Anything);
         let transfer = self.transfer.as_ref().filter(|_| is_waiting)?;
-        (now.0 > self.since.0 + TIME_OUT).then_some((transfer.key, self.since))
+        (now.0 > self.since.0.saturating_add(TIME_OUT)).then_some((transfer.key, self.since))
+    }
+
+    /// Whether the server has nothing to do.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.expect == Expect::Nothing && self.transfer.is_none()
+    }
+
+    /// The time for an answer begins anew.
+    pub(crate) fn resume(&mut self, now: Instant) {
+        self.since = now;
     }
 
     /// Expects nothing any more.
@@ -200,7 +212,10 @@ impl Channel {
                     }
                 }
                 // The end of the transfer: the server has nothing to add.
-                1 => Expect::Nothing,
+                1 if transfer.is_read => {
+                    self.transfer = None;
+                    return true;
+                }
                 _ => return false,
             },
             _ => return false,
@@ -269,6 +284,10 @@ impl Channel {
 
     /// Judges a response that is no abort.
     fn judge(&mut self, data: [u8; 8]) -> Result<Option<Event>, String> {
+        if self.is_within_block_download() {
+            // A server may acknowledge what it has of a block when the client is silent.
+            self.expect = Expect::BlockAcknowledge;
+        }
         let Some(transfer) = &mut self.transfer else {
             return Err("a response without a request".to_owned());
         };
@@ -352,9 +371,12 @@ impl Channel {
     }
 
     fn finish(&mut self) -> Result<Event, String> {
-        let Some(Transfer { key, data, size, is_download, .. }) = self.transfer.take() else {
+        let Some(Transfer { key, data, size, is_download, mode, .. }) = self.transfer.take() else {
             return Err("a response without a request".to_owned());
         };
+        if mode == Mode::Block && !is_download {
+            self.transfer = Some(Transfer { is_read: true, ..Transfer::new(key, false, mode) });
+        }
         if size.is_some_and(|size| size != data.len()) && data.len() < KEPT {
             let (index, sub) = key;
             let verb = if is_download { "accepted" } else { "sent" };
@@ -380,6 +402,7 @@ impl Transfer {
             has_crc: false,
             crc: 0,
             may_switch: false,
+            is_read: false,
         }
     }
 

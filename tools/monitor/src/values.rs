@@ -115,6 +115,17 @@ impl Values {
         self.held.range((from, 0)..=(to, 0xFF)).filter(move |(key, _)| key.1 == sub).map(|(key, _)| key.0)
     }
 
+    /// The values that a read must confirm.
+    pub(crate) fn unconfirmed(&self) -> impl Iterator<Item = Key> + '_ {
+        let held = self.held.iter().filter(|(_, held)| held.event != Event::None && held.present.is_some());
+        held.map(|(key, _)| *key).filter(|key| Sheet::is_parameter(self.sheet.as_ref(), *key))
+    }
+
+    /// Whether a client's value of the object must last.
+    pub(crate) fn is_parameter(&self, key: Key) -> bool {
+        Sheet::is_parameter(self.sheet.as_ref(), key)
+    }
+
     /// A value was read.
     pub(crate) fn read(&mut self, key: Key, bytes: &[u8], findings: &mut Findings) {
         let is_parameter = Sheet::is_parameter(self.sheet.as_ref(), key);

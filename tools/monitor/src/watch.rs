@@ -32,6 +32,8 @@ pub enum Sender {
 pub enum Incident {
     /// The node is switched on, or loses its power and gets it again.
     PowerOn,
+    /// The caller starts the node again: the next boot-up message has a reason.
+    Restart,
     /// The program has reset the chip.
     SoftwareReset,
     /// A watchdog or a fault has reset the chip.
@@ -98,6 +100,13 @@ impl Monitor {
         self.devices[device].values.set_sheet(sheet, is_new);
     }
 
+    /// Whether a participant has a data sheet: a change of its personality ends it.
+    #[must_use]
+    pub fn has_sheet(&self, participant: usize) -> bool {
+        let mut devices = self.devices.iter();
+        devices.any(|device| device.participant == Some(participant) && device.values.sheet().is_some())
+    }
+
     /// The data sheet of the node with this node-ID. `is_new`: nothing is saved in the node, so it has the defaults of
     /// the data sheet; otherwise they apply after a restore only.
     pub fn set_sheet_of_node(&mut self, node: u8, sheet: Sheet, is_new: bool) {
@@ -120,8 +129,8 @@ impl Monitor {
             return;
         }
         match device {
-            Some(device) => self.from_node(device, at, frame),
-            None => self.from_client(at, frame),
+            Some(device) => self.node_frame(device, at, frame),
+            None => self.client_frame(at, frame),
         }
     }
 
@@ -142,6 +151,7 @@ impl Monitor {
         let device = &mut self.devices[own];
         let was_injected = device.is_injected();
         match incident {
+            Incident::Restart => device.may_restart(),
             Incident::PowerOn | Incident::SoftwareReset => device.restart(Scope::All, at),
             Incident::ChipReset => {
                 device.restart(Scope::All, at);
@@ -174,6 +184,27 @@ impl Monitor {
         self.now = self.now.max(at);
         self.devices[own].known(key, bytes, at, &mut findings);
         self.report(own, findings);
+    }
+
+    /// The caller has not served the nodes until now: the rules about time begin anew.
+    pub fn resume(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        self.devices.iter_mut().for_each(|device| device.resume(now));
+    }
+
+    /// Whether the value of an object before a download decides a rule, and the SDO server of the participant is free: to
+    /// be asked before the download is passed to the monitor.
+    #[must_use]
+    pub fn is_wanted_before(&self, participant: usize, key: Key) -> bool {
+        let device = self.devices.iter().find(|device| device.participant == Some(participant));
+        device.is_some_and(|device| device.is_wanted_before(key))
+    }
+
+    /// The objects of a participant whose values decide a rule. A caller that can read them without the bus passes them
+    /// to [`value`](Monitor::value). Empty while the SDO server is busy.
+    pub fn wishes(&mut self, participant: usize) -> Vec<Key> {
+        let own = self.participant(participant);
+        self.devices[own].wishes()
     }
 
     /// The node-ID of a participant, once it is known.
@@ -254,7 +285,7 @@ impl Monitor {
         self.judged.as_ref().is_none_or(|judged| judged.contains(&node))
     }
 
-    fn from_node(&mut self, own: usize, at: Instant, frame: &Frame) {
+    fn node_frame(&mut self, own: usize, at: Instant, frame: &Frame) {
         let start = self.bus.recent.back().map_or(0.0, |passed| passed.start);
         let times = Times {
             at,
@@ -291,13 +322,13 @@ impl Monitor {
         }
     }
 
-    fn from_client(&mut self, at: Instant, frame: &Frame) {
+    fn client_frame(&mut self, at: Instant, frame: &Frame) {
         let (id, data) = (frame.id(), frame.data());
         match id {
             0 => {
-                if let [command, node, ..] = *data {
+                if let [command, node] = *data {
                     let all = self.devices.iter_mut();
-                    all.filter(|device| node == 0 || device.id == Some(node))
+                    all.filter(|device| node == 0 || device.id.is_none_or(|id| id == node))
                         .for_each(|device| device.command(command, at));
                 }
             }
@@ -307,10 +338,7 @@ impl Monitor {
             LSS_REQUEST => self.devices.iter_mut().for_each(Device::lss),
             0x601..=0x67F if !frame.is_remote() => {
                 let node = (id - 0x600) as u8;
-                let mut devices = self.devices.iter_mut();
-                if let Some(device) = devices.find(|device| device.id == Some(node)) {
-                    device.request(data, at);
-                }
+                self.devices.iter_mut().for_each(|device| device.request(node, data, at));
             }
             _ => self.others(at, frame),
         }
