@@ -56,7 +56,7 @@ pub struct Bench {
     watch: Watch,
     /// The deadline of the last poll.
     due: Instant,
-    /// A store job waits for [`store_now`](Bench::store_now); otherwise it is carried out at once.
+    /// Store jobs wait for [`begin_store`](Bench::begin_store); otherwise they are carried out at once.
     pub stores_later: bool,
 }
 
@@ -261,14 +261,25 @@ impl Bench {
     fn keep(&mut self, next: Next) {
         self.has_parameters |= next.parameters;
         match next.action {
-            Some(Action::Store(_)) if !self.stores_later => self.store_now(),
+            Some(Action::Store(_)) if !self.stores_later => {
+                if let Some(job) = self.begin_store() {
+                    self.end_store(job);
+                }
+            }
+            Some(Action::Store(_)) => (),
             other => self.actions.extend(other),
         }
     }
 
-    /// Carries out the store job that waits, if any.
-    pub fn store_now(&mut self) {
-        run_job(&mut self.protocol, &mut self.store, self.now, &mut self.out);
+    /// Hands over the store job that waits, if any: its values are those of now.
+    pub fn begin_store(&mut self) -> Option<StoreJob> {
+        take_job(&mut self.protocol, self.now, &mut self.out)
+    }
+
+    /// Carries out a store job.
+    pub fn end_store(&mut self, mut job: StoreJob) {
+        let result = job.run(&mut self.store);
+        let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
         self.observe();
     }
 

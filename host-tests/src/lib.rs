@@ -2,6 +2,8 @@
 
 pub mod asked;
 pub mod bench;
+#[cfg(feature = "board")]
+pub mod boards;
 pub mod calls;
 pub mod domain;
 pub mod lift417;

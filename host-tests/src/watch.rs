@@ -6,9 +6,8 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::io::Write as _;
 
-use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, Rule as Behaviour, Type};
 use canopen::{Frame, Instant, QueueFull, Transmit};
-use monitor::{Breach, Entry, Incident, Initial, Key, Kind, Monitor, Rule, Sender, Sheet};
+use monitor::{Breach, Incident, Key, Monitor, Rule, Sender, Sheet};
 use node::{FAULTS, Personality};
 use profiles::fault::Flags;
 
@@ -205,38 +204,12 @@ fn read(node: u8, (index, sub): Key, ask: &mut impl FnMut(&Frame, &mut Answers))
 /// The data sheet of a personality.
 #[must_use]
 pub fn sheet(personality: Personality) -> Sheet {
-    let entries = personality.rows().iter().map(|row| ((row.index, row.sub), entry(row))).collect();
-    let is_error = |fault: &&profiles::fault::Fault| fault.flags != Flags::NONE;
-    Sheet {
-        entries,
-        communication_errors: vec![0x8130, 0x8140],
-        device_errors: FAULTS.iter().filter(is_error).map(|fault| fault.condition.code).collect(),
-        changes_pdos: [0x2000, 0x2305, 0x6200].into(),
-        forgets_errors: true,
-    }
-}
-
-fn entry(row: &Object) -> Entry {
-    let is_parameter = row.access == Access::ReadWrite
-        && row.group.is_some()
-        && !row.rule.is_command()
-        && row.kind != Type::Domain
-        && !matches!(row.rule, Behaviour::ErrorCount | Behaviour::ScannerLine)
-        && !matches!(row.mapping, Mapping::Rpdo | Mapping::Both);
-    let group = match row.group {
-        Some(Group::Communication) => Some(2),
-        Some(Group::Application) => Some(3),
-        Some(Group::Calibration) | None => None,
-    };
-    Entry { kind: if is_parameter { Kind::Parameter } else { Kind::Volatile }, initial: initial(row), group }
-}
-
-fn initial(row: &Object) -> Initial {
-    let size = usize::from(row.kind.size());
-    match row.default {
-        DefaultValue::Integer(value) if size <= 8 => Initial::Bytes(value.to_le_bytes()[..size].to_vec()),
-        DefaultValue::Real(value) => Initial::Bytes(value.to_le_bytes().to_vec()),
-        DefaultValue::NodeId(base) => Initial::NodeId(base),
-        _ => Initial::Unknown,
-    }
+    let mut sheet = Sheet::from(personality.rows());
+    // The personality, and the choice of virtual devices of a lift.
+    sheet.changes_pdos.extend([0x2000, 0x2305]);
+    sheet.communication_errors = vec![0x8130, 0x8140];
+    // The flags of 3000h, and stored data that could not be loaded.
+    let flagged = FAULTS.iter().filter(|fault| fault.flags != Flags::NONE);
+    sheet.device_errors = flagged.map(|fault| fault.condition.code).chain([0x6300, 0x6302, 0x6303]).collect();
+    sheet
 }

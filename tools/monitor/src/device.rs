@@ -31,6 +31,8 @@ pub(crate) struct Device {
     pub(crate) id: Option<u8>,
     /// Faults are injected: the rules about time and resets are off until the next boot-up message.
     is_injected: bool,
+    /// A test may have changed the board since its last reset.
+    is_touched: bool,
     pub(crate) values: Values,
     nmt: Nmt,
     heartbeat: Heartbeat,
@@ -50,6 +52,7 @@ impl Device {
             participant,
             id: None,
             is_injected: false,
+            is_touched: false,
             values: Values::default(),
             nmt: Nmt::default(),
             heartbeat: Heartbeat::default(),
@@ -95,6 +98,17 @@ impl Device {
         self.boot.may_restart();
     }
 
+    /// A test may change the board.
+    pub(crate) fn touch(&mut self) {
+        self.is_touched = true;
+    }
+
+    /// The chip is reset by a watchdog or a fault. Returns whether a test may have changed the board before.
+    pub(crate) fn chip_reset(&mut self, now: Instant) -> bool {
+        self.restart(Scope::All, now);
+        std::mem::take(&mut self.is_touched)
+    }
+
     /// LSS may change the node-ID or the bit rate.
     pub(crate) fn lss(&mut self) {
         self.boot.may_restart();
@@ -134,12 +148,13 @@ impl Device {
             return Vec::new();
         }
         self.is_wishful = false;
-        self.values.unconfirmed().collect()
+        let class = self.nmt.demands().filter(|class| self.values.sure_number(0x1029, *class).is_none());
+        self.values.unconfirmed().chain(class.map(|class| (0x1029, class))).collect()
     }
 
     /// Whether the value of an object before a download decides a rule, and the SDO server is free.
     pub(crate) fn is_wanted_before(&self, key: Key) -> bool {
-        self.values.is_parameter(key)
+        self.values.holds_value(key)
             && self.channel.is_idle()
             && self.nmt.state().is_some_and(State::has_services)
             && !self.boot.is_waiting()
@@ -305,7 +320,8 @@ impl Device {
         let is_on = self.emcy_id().is_some();
         let inhibited = self.emcy_inhibit().zip(self.errors.last());
         let is_inhibited = inhibited.is_some_and(|(inhibit, last)| at.0 < last.0 + inhibit.0 + 1000);
-        self.nmt.heartbeat(state, is_on && !is_inhibited, at, findings);
+        let behaviour = self.nmt.demands().and_then(|class| self.values.sure_number(0x1029, class));
+        self.nmt.heartbeat(state, behaviour, is_on && !is_inhibited, at, findings);
     }
 
     fn emcy(&mut self, data: &[u8], times: Times, findings: &mut Findings) {
@@ -320,8 +336,8 @@ impl Device {
                     sheet.device_errors.contains(&code).then_some(2)
                 }
             });
-            let behaviour = class.and_then(|sub| self.values.sure_number(0x1029, sub));
-            self.nmt.error(code, behaviour);
+            self.nmt.error(code, class);
+            self.is_wishful = true;
         }
     }
 

@@ -21,8 +21,8 @@ struct Command {
 #[derive(Clone, Copy, Debug)]
 struct Demand {
     code: u16,
-    /// 1029h: 0 leads to Pre-operational, 2 to Stopped.
-    behaviour: u32,
+    /// The sub-index of 1029h for this class of errors.
+    class: u8,
     heartbeats: u8,
 }
 
@@ -66,17 +66,29 @@ impl Nmt {
         *self = Nmt::default();
     }
 
-    /// An EMCY: explains a change. `behaviour`: the value of 1029h for this error, if known.
-    pub(crate) fn error(&mut self, code: u16, behaviour: Option<u32>) {
+    /// An EMCY: explains a change. `class`: the sub-index of 1029h for this error, if known.
+    pub(crate) fn error(&mut self, code: u16, class: Option<u8>) {
         self.explained = EXPLAINED;
-        if let Some(behaviour) = behaviour {
-            self.demand = Some(Demand { code, behaviour, heartbeats: 0 });
+        if let Some(class) = class {
+            self.demand = Some(Demand { code, class, heartbeats: 0 });
         }
     }
 
-    /// A heartbeat. `has_emcy`: the node can send EMCY at once.
-    pub(crate) fn heartbeat(&mut self, state: State, has_emcy: bool, now: Instant, findings: &mut Findings) {
-        self.follow_demand(state, findings);
+    /// The sub-index of 1029h whose value decides about the next heartbeat.
+    pub(crate) fn demands(&self) -> Option<u8> {
+        Some(self.demand?.class)
+    }
+
+    /// A heartbeat. `behaviour`: the value of 1029h for the last error. `has_emcy`: the node can send EMCY at once.
+    pub(crate) fn heartbeat(
+        &mut self,
+        state: State,
+        behaviour: Option<u32>,
+        has_emcy: bool,
+        now: Instant,
+        findings: &mut Findings,
+    ) {
+        self.follow_demand(state, behaviour, findings);
         let before = self.shown.replace(state);
         let explained = self.explained > 0 || !has_emcy;
         self.explained = self.explained.saturating_sub(1);
@@ -106,21 +118,22 @@ impl Nmt {
         findings.push((Rule::NmtState, format!("{} becomes {} without {reason}", name(before), name(state))));
     }
 
-    /// The state that 1029h demands is shown by the second heartbeat after the EMCY.
-    fn follow_demand(&mut self, state: State, findings: &mut Findings) {
+    /// The state that 1029h demands (0 Pre-operational, 2 Stopped) is shown by the second heartbeat after the EMCY.
+    fn follow_demand(&mut self, state: State, behaviour: Option<u32>, findings: &mut Findings) {
         let Some(demand) = &mut self.demand else { return };
         demand.heartbeats += 1;
-        let is_met = match demand.behaviour {
-            0 => state != State::Operational,
-            2 => state == State::Stopped,
+        let is_met = match behaviour {
+            Some(0) => state != State::Operational,
+            Some(2) => state == State::Stopped,
             _ => true,
         };
         if is_met {
             self.demand = None;
         } else if demand.heartbeats >= 2 {
-            let Demand { code, behaviour, .. } = *demand;
+            let Demand { code, class, .. } = *demand;
             self.demand = None;
-            let text = format!("{} after EMCY {code:04X}h, 1029h demands {behaviour}", name(state));
+            let behaviour = behaviour.unwrap_or(0);
+            let text = format!("{} after EMCY {code:04X}h, 1029h:{class} is {behaviour}", name(state));
             findings.push((Rule::ErrorBehaviour, text));
         }
     }

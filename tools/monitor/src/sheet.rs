@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, Rule, Type};
+
 use crate::Key;
 
 /// The kind of an object, as far as the rules depend on it.
@@ -9,6 +11,8 @@ use crate::Key;
 pub enum Kind {
     /// A parameter: holds what a client has written until the next write or reset.
     Parameter,
+    /// A parameter that an RPDO may change, too.
+    Received,
     /// A measured value, a command or a domain: may read differently at any time.
     Volatile,
 }
@@ -55,17 +59,71 @@ pub struct Sheet {
     pub forgets_errors: bool,
 }
 
+/// The sheet of a dictionary made with crate `canopen`.
+impl From<&[Object]> for Sheet {
+    fn from(rows: &[Object]) -> Sheet {
+        let is_timer = |row: &&Object| matches!(row.rule, Rule::EventTimerOf(_));
+        Sheet {
+            entries: rows.iter().map(|row| ((row.index, row.sub), Entry::of(row))).collect(),
+            changes_pdos: rows.iter().filter(is_timer).map(|row| row.index).collect(),
+            forgets_errors: true,
+            ..Sheet::default()
+        }
+    }
+}
+
+impl Entry {
+    fn of(row: &Object) -> Entry {
+        let is_value = row.access == Access::ReadWrite && row.kind != Type::Domain;
+        let is_list = matches!(row.rule, Rule::ErrorCount | Rule::ScannerLine);
+        let kind = match row.mapping {
+            Mapping::Rpdo | Mapping::Both if is_value => Kind::Received,
+            _ if is_value && row.group.is_some() && !row.rule.is_command() && !is_list => Kind::Parameter,
+            _ => Kind::Volatile,
+        };
+        let group = match row.group {
+            Some(Group::Communication) => Some(COMMUNICATION),
+            Some(Group::Application) => Some(APPLICATION),
+            Some(Group::Calibration) | None => None,
+        };
+        let size = usize::from(row.kind.size());
+        let initial = match row.default {
+            DefaultValue::Integer(value) if size <= 8 => {
+                Initial::Bytes(value.to_le_bytes()[..size].to_vec())
+            }
+            DefaultValue::Real(value) => Initial::Bytes(value.to_le_bytes().to_vec()),
+            DefaultValue::NodeId(base) => Initial::NodeId(base),
+            _ => Initial::Unknown,
+        };
+        Entry { kind, initial, group }
+    }
+}
+
 impl Sheet {
     /// Whether a client's value of the object must last. Without a data sheet: the communication parameters that CiA
     /// 301 defines.
     pub(crate) fn is_parameter(sheet: Option<&Sheet>, key: Key) -> bool {
         match sheet {
             Some(sheet) => sheet.entries.get(&key).is_some_and(|entry| entry.kind == Kind::Parameter),
-            None => matches!(
-                key.0,
-                0x1005..=0x1007 | 0x1012 | 0x1014..=0x1017 | 0x1019 | 0x1029 | 0x1200..=0x1BFF | 0x1F80
-            ),
+            None => Sheet::is_communication_parameter(key),
         }
+    }
+
+    /// Whether CiA 301 and CiA 302 define the object as a communication parameter of every device.
+    #[must_use]
+    pub fn is_communication_parameter(key: Key) -> bool {
+        matches!(
+            key.0,
+            0x1005..=0x1007 | 0x1012 | 0x1014..=0x1017 | 0x1019 | 0x1029 | 0x1200..=0x1BFF | 0x1F80
+        )
+    }
+
+    /// Whether the object holds a value, of a client or of an RPDO.
+    pub(crate) fn holds_value(sheet: Option<&Sheet>, key: Key) -> bool {
+        let is_received = |sheet: &Sheet| {
+            sheet.entries.get(&key).is_some_and(|entry| entry.kind == Kind::Received)
+        };
+        Sheet::is_parameter(sheet, key) || sheet.is_some_and(is_received)
     }
 
     /// Whether a write to the object may change the parameters of PDOs. Without a data sheet: every object of the

@@ -118,12 +118,12 @@ impl Values {
     /// The values that a read must confirm.
     pub(crate) fn unconfirmed(&self) -> impl Iterator<Item = Key> + '_ {
         let held = self.held.iter().filter(|(_, held)| held.event != Event::None && held.present.is_some());
-        held.map(|(key, _)| *key).filter(|key| Sheet::is_parameter(self.sheet.as_ref(), *key))
+        held.map(|(key, _)| *key).filter(|key| self.holds_value(*key))
     }
 
-    /// Whether a client's value of the object must last.
-    pub(crate) fn is_parameter(&self, key: Key) -> bool {
-        Sheet::is_parameter(self.sheet.as_ref(), key)
+    /// Whether the object holds a value of a client.
+    pub(crate) fn holds_value(&self, key: Key) -> bool {
+        Sheet::holds_value(self.sheet.as_ref(), key)
     }
 
     /// A value was read.
@@ -149,6 +149,9 @@ impl Values {
             }
             Event::Written if is_parameter => {
                 report(Rule::ReadBack, format!("reads {is} after an accepted download of {was}"));
+            }
+            Event::Loaded if is_parameter && matches!(held.saved, Saved::NodeId(_)) => {
+                report(Rule::CanId, format!("reads {is} and does not follow the node-ID: {was}"));
             }
             Event::Loaded if is_parameter => {
                 report(Rule::SaveLost, format!("reads {is} after a reset, saved is {was}"));
@@ -222,7 +225,7 @@ impl Values {
             }
             held.is_restored = false;
             held.saved = match &held.present {
-                Some(value) if held.is_sure => saved(*key, value, node_id),
+                Some(value) if held.is_sure => saved(sheet, *key, value, node_id),
                 _ => Saved::Unknown,
             };
         }
@@ -286,16 +289,20 @@ fn is_in(sheet: Option<&Sheet>, key: Key, sub: u8) -> bool {
 }
 
 /// The saved form of a value. A COB-ID that equals the pre-defined one follows the node-ID.
-fn saved(key: Key, value: &[u8], node_id: u8) -> Saved {
-    let fits = |base: u32| number(value) & 0x7FF == base + u32::from(node_id);
-    let base = match key {
-        (0x1014, 0) => Some(0x80),
-        (0x1800..=0x1803, 1) => TPDO_CAN_IDS.get(usize::from(key.0 - 0x1800)).copied(),
+fn saved(sheet: Option<&Sheet>, key: Key, value: &[u8], node_id: u8) -> Saved {
+    let node_id = u32::from(node_id);
+    let entry = sheet.and_then(|sheet| sheet.entries.get(&key));
+    let base = match (entry.map(|entry| &entry.initial), key) {
+        (Some(Initial::NodeId(base)), _) => Some(base & 0x7FF),
+        (None, (0x1014, 0)) => Some(0x80),
+        (None, (0x1800..=0x1803, 1)) => TPDO_CAN_IDS.get(usize::from(key.0 - 0x1800)).copied(),
         _ => None,
     };
-    match base.filter(|base| value.len() == 4 && fits(*base)) {
-        Some(_) => Saved::NodeId(number(value) - u32::from(node_id)),
-        None => Saved::Value(value.to_vec()),
+    match base {
+        Some(base) if value.len() == 4 && number(value) & 0x7FF == base + node_id => {
+            Saved::NodeId(number(value) - node_id)
+        }
+        _ => Saved::Value(value.to_vec()),
     }
 }
 

@@ -38,6 +38,8 @@ pub enum Incident {
     SoftwareReset,
     /// A watchdog or a fault has reset the chip.
     ChipReset,
+    /// A test may have changed the board: the next reset of the chip has a reason.
+    Touched,
     /// A test has injected a fault, or has changed the flash: everything may happen until the next boot-up message.
     Injected,
 }
@@ -152,10 +154,11 @@ impl Monitor {
         let was_injected = device.is_injected();
         match incident {
             Incident::Restart => device.may_restart(),
+            Incident::Touched => device.touch(),
             Incident::PowerOn | Incident::SoftwareReset => device.restart(Scope::All, at),
             Incident::ChipReset => {
-                device.restart(Scope::All, at);
-                if !was_injected {
+                let was_touched = device.chip_reset(at);
+                if !was_injected && !was_touched {
                     let text = "the chip was reset by a watchdog or a fault".to_owned();
                     self.report(own, vec![(Rule::UnexpectedReset, text)]);
                 }

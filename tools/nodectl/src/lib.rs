@@ -31,6 +31,7 @@ pub mod nmt;
 pub mod object;
 mod pdo_parameters;
 pub mod quantity;
+pub mod rules;
 pub mod scan;
 pub mod sdo;
 pub mod text;
