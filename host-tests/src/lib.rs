@@ -2,6 +2,8 @@
 
 pub mod asked;
 pub mod bench;
+#[cfg(feature = "board")]
+pub mod boards;
 pub mod calls;
 pub mod domain;
 pub mod lift417;
@@ -11,3 +13,4 @@ pub mod sdo;
 pub mod station;
 pub mod tables;
 pub mod thorough;
+pub mod watch;
