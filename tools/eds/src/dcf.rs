@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::{Eds, Reals};
 use crate::write::{Sections, device_info, write_lists};
+use crate::{Eds, Reals};
 
 /// Section `[DeviceComissioning]` (with this spelling): the device that the values are for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -57,8 +57,14 @@ impl Formula {
     /// The text of a value of a data type.
     pub(crate) fn text(&self, data_type: DataType, reals: Reals) -> String {
         match (self, data_type.class()) {
-            (Formula::Constant(Value::Real(value)), class) if reals == Reals::Decimal && value.is_finite() => {
-                if class == Class::Real(32) { format!("{:?}", *value as f32) } else { format!("{value:?}") }
+            (Formula::Constant(Value::Real(value)), class)
+                if reals == Reals::Decimal && value.is_finite() =>
+            {
+                if class == Class::Real(32) {
+                    format!("{:?}", *value as f32)
+                } else {
+                    format!("{value:?}")
+                }
             }
             (Formula::NodeId(base), _) => format!("$NODEID+0x{base:X}"),
             (Formula::Constant(Value::Text(text)), _) => text.clone(),

@@ -112,8 +112,8 @@ fn commands_are_excluded_from_a_download_and_what_is_stored_is_not() {
             let flags = eds.get(row.index, row.sub).unwrap().flags.unwrap();
             let acts = matches!(
                 row.index,
-                0x1003 | 0x1010 | 0x1011 | 0x1F51 | 0x2000 | 0x2108 | 0x2109 | 0x2200..=0x2204 | 0x2322 | 0x2F00
-                    | 0x6003 | 0x6010 | 0x6125 | 0x6382 | 0x6486 | 0x6925
+                0x1003 | 0x1010 | 0x1011 | 0x1F51 | 0x2000 | 0x2108 | 0x2109 | 0x2200
+                    ..=0x2204 | 0x2322 | 0x2F00 | 0x6003 | 0x6010 | 0x6125 | 0x6382 | 0x6486 | 0x6925
             );
             let acts = acts
                 || matches!((row.index, row.sub), (0x2002, 2) | (0x2003, 3))
@@ -122,7 +122,11 @@ fn commands_are_excluded_from_a_download_and_what_is_stored_is_not() {
         }
         // A domain, and a list that is empty most of the time.
         for (index, sub) in [(0x2F00, 0), (0x1003, 1)] {
-            assert!(eds.get(index, sub).unwrap().flags.is_some_and(Flags::refuse_read), "{}", device.file_name);
+            assert!(
+                eds.get(index, sub).unwrap().flags.is_some_and(Flags::refuse_read),
+                "{}",
+                device.file_name
+            );
         }
     }
 }

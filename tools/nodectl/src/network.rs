@@ -71,7 +71,15 @@ impl Network {
     ) -> Result<Network, BusError> {
         let bus = opener()?;
         let (opener, kept) = (Box::new(opener), VecDeque::new());
-        Ok(Network { opener, bus, kept, newest: None, log: None, others: OtherClients::default(), heard: BTreeMap::new() })
+        Ok(Network {
+            opener,
+            bus,
+            kept,
+            newest: None,
+            log: None,
+            others: OtherClients::default(),
+            heard: BTreeMap::new(),
+        })
     }
 
     /// Opens the bus again. The kept frames of the old bus are dropped.

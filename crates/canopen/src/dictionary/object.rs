@@ -111,7 +111,20 @@ impl Object {
             _ => DefaultValue::Integer(0),
         };
         let (mapping, group, rule) = (Mapping::No, None, Rule::of(index, sub));
-        Object { index, sub, name, kind, access, mapping, limits: None, default, group, unit: "", rule, acts: false }
+        Object {
+            index,
+            sub,
+            name,
+            kind,
+            access,
+            mapping,
+            limits: None,
+            default,
+            group,
+            unit: "",
+            rule,
+            acts: false,
+        }
     }
 
     /// Sub-index 0 of a record or an array: the highest sub-index.

@@ -259,12 +259,7 @@ fn left(step: &Write, now: &Configuration, refusals: &Refusals) -> String {
 }
 
 /// Writes parameters in their order. A refused one does not stop the others: it may be taken in the next pass.
-fn write_all(
-    session: &mut Session,
-    node: NodeId,
-    sheet: &Eds,
-    steps: &[Write],
-) -> Result<Refusals, Failure> {
+fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) -> Result<Refusals, Failure> {
     let mut refusals = Refusals::new();
     for step in steps {
         let Some(entry) = sheet.get(step.at.index, step.at.sub) else { continue };

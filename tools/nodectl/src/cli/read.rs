@@ -93,11 +93,9 @@ impl Read {
         }
         match failures.first() {
             None => Ok(()),
-            Some(first) => Err(Failure::Objects {
-                failed: failures.len(),
-                all,
-                exit_code: first.exit_code(),
-            }),
+            Some(first) => {
+                Err(Failure::Objects { failed: failures.len(), all, exit_code: first.exit_code() })
+            }
         }
     }
 

@@ -54,7 +54,8 @@ impl Scan {
         let answering: Vec<u8> =
             nodes.iter().filter(|row| row.device_type.is_some()).map(|row| row.node).collect();
         session.print(&Found { nodes })?;
-        for (node, heard) in session.network.all_heard().filter(|(node, _)| !answering.contains(&node.get())) {
+        for (node, heard) in session.network.all_heard().filter(|(node, _)| !answering.contains(&node.get()))
+        {
             note(format_args!("node {}: {}", node.get(), silence(node, Some(heard))));
         }
         if is_empty {

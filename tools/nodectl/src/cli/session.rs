@@ -17,11 +17,11 @@ use super::sheets::{Device, Sheets, misfit};
 use super::{Failure, Options, Output};
 use crate::bus::NoBus;
 use crate::configuration::Configuration;
+use crate::network::Heard;
 use crate::object::at;
 use crate::sdo::{self, Channel, Client};
 use crate::text::{note, visible_lines};
 use crate::value;
-use crate::network::Heard;
 use crate::{Catalogue, Network, heartbeat};
 
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
@@ -201,7 +201,8 @@ impl Session {
             note(format_args!("node {}: {}", node.get(), misfit(sheet, device)));
             return Ok(Catalogue::new(sheet.clone()));
         }
-        let built_in = device.0.zip(device.1).and_then(|(vendor, product)| Catalogue::built_in(vendor, product));
+        let built_in =
+            device.0.zip(device.1).and_then(|(vendor, product)| Catalogue::built_in(vendor, product));
         Ok(built_in.unwrap_or_else(Catalogue::unknown))
     }
 
@@ -257,14 +258,19 @@ impl Session {
             }
             (0x0800_0022, 0x6125 | 0x6925) => {
                 let status = 0x6150 + (error.at.index - 0x6125);
-                Some(format!("the process value is not valid: see the status, {status:04X}h:{}", error.at.sub))
+                Some(format!(
+                    "the process value is not valid: see the status, {status:04X}h:{}",
+                    error.at.sub
+                ))
             }
-            (0x0800_0022, 0x2200..=0x2202) if catalogue?.is_of_this_project() => {
-                Some("the calibration is locked; `nodectl write 2203 cali` opens it until the next reset".to_owned())
-            }
-            (0x0601_0000, 0x2107) if catalogue?.is_of_this_project() => {
-                Some("the factory data are locked; `nodectl write 2108 fact` opens them until the next reset".to_owned())
-            }
+            (0x0800_0022, 0x2200..=0x2202) if catalogue?.is_of_this_project() => Some(
+                "the calibration is locked; `nodectl write 2203 cali` opens it until the next reset"
+                    .to_owned(),
+            ),
+            (0x0601_0000, 0x2107) if catalogue?.is_of_this_project() => Some(
+                "the factory data are locked; `nodectl write 2108 fact` opens them until the next reset"
+                    .to_owned(),
+            ),
             (0x0609_0011, 0x1010 | 0x1011) => Some("the node has no such group of parameters".to_owned()),
             _ => None,
         }
@@ -293,7 +299,8 @@ pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
             "the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned()
         }
         Some(Heard { state, .. }) => {
-            let state = state.map(|state| format!(" (it is {})", heartbeat::words(state))).unwrap_or_default();
+            let state =
+                state.map(|state| format!(" (it is {})", heartbeat::words(state))).unwrap_or_default();
             format!(
                 "the node sends{state} and does not answer: its PDOs may leave no room on the bus; \
                  `nodectl nmt preop -n {node}` ends them, then longer event timers and inhibit times help (1800h:5, 1800h:3)"

@@ -103,7 +103,8 @@ mod tests {
 
     #[test]
     fn each_device_gets_the_newest_data_sheet_of_its_identity() {
-        let folder = Sheets::Folder(vec![sheet_of(1, 2, 1), sheet_of(1, 2, 3), sheet_of(1, 5, 9), sheet_of(0, 0, 9)]);
+        let folder =
+            Sheets::Folder(vec![sheet_of(1, 2, 1), sheet_of(1, 2, 3), sheet_of(1, 5, 9), sheet_of(0, 0, 9)]);
         let found = |vendor, product| folder.of((vendor, product)).map(|sheet| sheet.device.revision_number);
         assert_eq!(found(Some(1), Some(2)), Some(3));
         assert_eq!(found(Some(1), Some(5)), Some(9));

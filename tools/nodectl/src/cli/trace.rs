@@ -118,7 +118,9 @@ impl Trace {
         let mut decoder = Decoder::default();
         if let Some(sheet) = session.sheets()?.file().cloned() {
             let catalogue = Arc::new(Catalogue::new(sheet));
-            self.named().into_iter().for_each(|node| decoder.know(node, Knowledge::new(Arc::clone(&catalogue))));
+            self.named()
+                .into_iter()
+                .for_each(|node| decoder.know(node, Knowledge::new(Arc::clone(&catalogue))));
         }
         if self.file.is_none() && !self.silent {
             for node in self.present(session)? {

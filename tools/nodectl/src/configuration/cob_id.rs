@@ -52,7 +52,9 @@ mod tests {
     fn a_pre_defined_cob_id_follows_the_node_id_with_its_flags() {
         for node in [1, 16, 127] {
             let id = i128::from(node);
-            for (index, sub, base) in [(0x1800, 1, 0x180), (0x1801, 1, 0x280), (0x1400, 1, 0x200), (0x1014, 0, 0x80)] {
+            for (index, sub, base) in
+                [(0x1800, 1, 0x180), (0x1801, 1, 0x280), (0x1400, 1, 0x200), (0x1014, 0, 0x80)]
+            {
                 for flags in [0, 1 << 30, 1 << 31, 3 << 30] {
                     let formula = formula_of(index, sub, flags | (base + id), node.try_into().unwrap());
                     assert_eq!(formula, Some(Formula::NodeId(flags | base)), "{index:04X}h of node {node}");

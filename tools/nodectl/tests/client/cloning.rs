@@ -71,7 +71,10 @@ impl Board {
         for row in self.parameters() {
             let place = at(row.index, row.sub);
             let now = self.read(place);
-            candidates(row, self.id).into_iter().filter(|bytes| *bytes != now).find(|bytes| self.write(place, bytes));
+            candidates(row, self.id)
+                .into_iter()
+                .filter(|bytes| *bytes != now)
+                .find(|bytes| self.write(place, bytes));
         }
         self.run(&["save"]);
         self.run(&["nmt", "reset"]);
@@ -83,7 +86,9 @@ fn candidates(row: &Object, id: u8) -> Vec<Vec<u8>> {
     let default = match row.default {
         DefaultValue::Integer(value) => value,
         DefaultValue::NodeId(base) => i64::from(base) + i64::from(id),
-        DefaultValue::Real(value) => return [value + 1.5, 0.5, 2.0].map(|value| value.to_le_bytes().to_vec()).into(),
+        DefaultValue::Real(value) => {
+            return [value + 1.5, 0.5, 2.0].map(|value| value.to_le_bytes().to_vec()).into();
+        }
         DefaultValue::Text(_) | DefaultValue::None => return Vec::new(),
     };
     let size = usize::try_from(row.kind.size()).unwrap_or(0);
@@ -125,7 +130,8 @@ fn every_parameter_survives_dump_and_apply_on_boards_of_every_node_id_and_the_wa
         for id in NODE_IDS {
             let context = format!("{personality:?} {id}");
             let board = Board::new(personality, id);
-            let (factory, configured) = (path(&format!("factory-{number}-{id}")), path(&format!("all-{number}-{id}")));
+            let (factory, configured) =
+                (path(&format!("factory-{number}-{id}")), path(&format!("all-{number}-{id}")));
             let defaults = board.values();
             board.run(&["dump", &factory]);
             board.change_everything();
@@ -155,13 +161,17 @@ fn every_parameter_survives_dump_and_apply_on_boards_of_every_node_id_and_the_wa
 fn a_cob_id_that_follows_the_node_id_is_dumped_as_a_formula() {
     for personality in [Personality::Pressure, Personality::Encoder, Personality::Combined] {
         let (board, file) = (Board::new(personality, 1), path(&format!("following-{personality:?}")));
-        let carried = board.personality.rows().iter().rfind(|row| row.mapping == Mapping::Tpdo).expect("a value");
+        let carried =
+            board.personality.rows().iter().rfind(|row| row.mapping == Mapping::Tpdo).expect("a value");
         board.run(&["map", "tpdo", "2", &format!("{:04X}:{}", carried.index, carried.sub)]);
         board.run(&["write", "1400:1", "0x80000185"]);
         board.run(&["dump", "--all", &file]);
         let text = std::fs::read_to_string(&file).expect("a file");
         assert!(text.contains("ParameterValue=$NODEID+0x280\r\n"), "{personality:?}");
-        assert!(text.contains("ParameterValue=0x80000185\r\n"), "{personality:?}: the COB-ID of another node stays");
+        assert!(
+            text.contains("ParameterValue=0x80000185\r\n"),
+            "{personality:?}: the COB-ID of another node stays"
+        );
         let other = Board::new(personality, 2);
         other.run(&["apply", &file]);
         assert!(other.run(&["read", "1801:1"]).contains("(00000282h)"), "{personality:?}");

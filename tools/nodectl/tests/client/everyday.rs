@@ -101,7 +101,8 @@ fn deaf(id: u16, data: &[u8]) -> Wire<Deaf> {
     Wire::new(Deaf(Frame::new(id, data).expect("a frame"), Instant(0)))
 }
 
-const COMMANDS: [&[&str]; 5] = [&["info"], &["read", "1000"], &["monitor"], &["dump"], &["write", "1017", "1"]];
+const COMMANDS: [&[&str]; 5] =
+    [&["info"], &["read", "1000"], &["monitor"], &["dump"], &["write", "1017", "1"]];
 
 #[test]
 fn every_command_says_what_to_do_about_a_silent_node() {
@@ -109,7 +110,10 @@ fn every_command_says_what_to_do_about_a_silent_node() {
         let wire = Wire::new(vec![Pressure::new(1)]);
         let (code, text) = failed(&wire, &[line, &["-n", "9"]].concat());
         assert_eq!(code, 3);
-        assert!(text.contains("nothing is heard of node 9: is it on") && text.contains("nodectl scan"), "{text}");
+        assert!(
+            text.contains("nothing is heard of node 9: is it on") && text.contains("nodectl scan"),
+            "{text}"
+        );
     }
 }
 
@@ -231,7 +235,10 @@ fn each_node_gets_the_data_sheet_of_its_identity() {
     assert!(code == 7 && text.ends_with("there is no data sheet in this folder"), "{text}");
     for device in &eds::DEVICES {
         let text = device.sheet(&eds::Edition::default());
-        let other = text.replace("ParameterName=Producer heartbeat time", &format!("ParameterName=Beat of {}", device.file_name));
+        let other = text.replace(
+            "ParameterName=Producer heartbeat time",
+            &format!("ParameterName=Beat of {}", device.file_name),
+        );
         std::fs::write(format!("{folder}/{}", device.file_name), other).expect("a file");
     }
     std::fs::write(format!("{folder}/broken.eds"), "[1000]\nObjectType=9999\n").expect("a file");

@@ -77,9 +77,8 @@ impl Scan {
     /// The next node while the former ones stay selected. Silence is asked once more, with longer steps.
     fn following(&self, session: &mut Session) -> Result<Option<Identity>, Failure> {
         let (step, bar) = (step(session, self.step), bar());
-        let mut search = |step| {
-            Master::new(&mut session.network, step).fastscan(|asked| bar.set_position(asked.into()))
-        };
+        let mut search =
+            |step| Master::new(&mut session.network, step).fastscan(|asked| bar.set_position(asked.into()));
         let found = match search(step)? {
             Some(identity) => Some(identity),
             None => search(canopen::Duration(2 * step.0))?,

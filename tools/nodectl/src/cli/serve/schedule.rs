@@ -58,8 +58,8 @@ impl<J> Schedule<J> {
     /// of the bus uses the SDO server of the node.
     pub(super) fn next(&mut self, is_used: impl Fn(NodeId) -> bool) -> Option<(u64, J)> {
         let is_free = |lane: Lane| !matches!(lane, Lane::Node(node) if is_used(node));
-        let place = (0..self.waiting.len())
-            .find(|&place| is_free(self.waiting[place].0) && self.may_begin(place))?;
+        let place =
+            (0..self.waiting.len()).find(|&place| is_free(self.waiting[place].0) && self.may_begin(place))?;
         let (lane, haste, job) = self.waiting.remove(place);
         self.next += 1;
         self.running.push((self.next, lane, haste));

@@ -193,7 +193,9 @@ fn work(
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
     session.has_many_nodes = true;
     if let Some(Known { node, channel, catalogue }) = known {
-        session.network.set_channel(node, Some(channel).filter(|channel| *channel != Channel::default_of(node)));
+        session
+            .network
+            .set_channel(node, Some(channel).filter(|channel| *channel != Channel::default_of(node)));
         session.know(node, catalogue);
     }
     let mut context = Context { session, orders: orders.clone(), number };

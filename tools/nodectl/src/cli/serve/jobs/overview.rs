@@ -54,7 +54,8 @@ fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Arc<Catalo
     let personality =
         vendor.zip(product).and_then(|(vendor, product)| Catalogue::device_name(vendor, product));
     let file = session.sheets()?.file();
-    let note = file.filter(|sheet| !fits(sheet, (vendor, product))).map(|sheet| misfit(sheet, (vendor, product)));
+    let note =
+        file.filter(|sheet| !fits(sheet, (vendor, product))).map(|sheet| misfit(sheet, (vendor, product)));
     let identity = Identity {
         name,
         personality,

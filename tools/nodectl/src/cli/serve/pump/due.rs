@@ -87,8 +87,12 @@ impl Pump {
             let is_alone = self.others.since_request(node, now).is_none_or(|time| time > ALONE);
             entry.is_alive() && is_new && !is_deaf && is_alone && entry.since_boot(t) > AFTER_BOOT
         };
-        let unknown: Vec<NodeId> =
-            self.nodes.iter().filter(|(node, entry)| is_to_be_asked(*node, entry)).map(|(node, _)| node).collect();
+        let unknown: Vec<NodeId> = self
+            .nodes
+            .iter()
+            .filter(|(node, entry)| is_to_be_asked(*node, entry))
+            .map(|(node, _)| node)
+            .collect();
         for node in unknown {
             self.nodes.change(node).asked = Some(t);
             self.enqueue(None, Lane::Node(node), Haste::Background, Some(node), jobs::identify(node));
