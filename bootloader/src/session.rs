@@ -24,8 +24,8 @@ use crate::target::TARGET;
 const PERIOD: Duration = Duration::from_millis(20);
 /// Polling interval while a sector is being erased.
 const ERASE_POLL: Duration = Duration::from_millis(1);
-/// Time for which a reset waits for unsent frames, on a bus where nobody acknowledges.
-const FAREWELL: Duration = Duration::from_millis(20);
+/// Longest time for which a reset waits for unsent frames: at 10 kbit/s a frame of another node, and two of this one.
+const FAREWELL: Duration = Duration::from_millis(50);
 
 /// Everything except the queues.
 pub(crate) struct Session {
@@ -139,13 +139,13 @@ impl Session {
         self.publish();
         if self.is_resuming && next == Next::Nothing {
             self.is_resuming = false;
-            self.start_if_good(now);
+            self.start_if_good();
         }
         next
     }
 
     /// The copy of an earlier start is finished or was refused: starts the application in either case, if it is valid.
-    fn start_if_good(&mut self, now: Instant) {
+    fn start_if_good(&mut self) {
         let updater = self.device.application_mut().updater();
         if updater.phase() == Phase::Installed {
             // The crash count belonged to another image.
@@ -154,7 +154,7 @@ impl Session {
         let start = Start { crashes: retained::crashes(), proof: Proof::Waived, ..Start::default() };
         let flash = updater.flash();
         if matches!(update::boot(flash, &TARGET, start), Decision::Start(_)) {
-            self.reset = Some(now);
+            self.reset_soon();
         }
     }
 

@@ -134,7 +134,6 @@ impl Application for NodeApplication {
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         match entry.index() {
             PROGRAM_TRIAL => {
-                self.admit()?;
                 let is_at_work = self.has_measured();
                 self.trial.command(bytes, is_at_work)
             }
@@ -210,8 +209,8 @@ impl Application for NodeApplication {
         self.flags.set(flag_of(group), !good);
     }
 
-    fn stop_program(&mut self) -> Result<(), Abort> {
-        self.admit()
+    fn admits(&self, entry: &Entry) -> Result<(), Abort> {
+        self.admit(entry.index(), entry.sub())
     }
 
     fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {

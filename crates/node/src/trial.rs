@@ -100,12 +100,14 @@ impl Protocol {
     }
 
     /// Takes note of a frame from a master: an NMT command, a request to the SDO server, or a monitored heartbeat.
-    /// Frames for other nodes do not arrive here.
+    /// Frames for other nodes do not arrive here. With a key (2003h), frames count once its holder has answered the
+    /// challenge.
     pub(crate) fn note_master(&mut self, frame: &Frame) {
         const FUNCTION: u16 = 0x780;
         let function = frame.id() & FUNCTION;
+        let application = self.device.application_mut();
         if frame.id() == CanId::NMT.get() || matches!(function, 0x600 | 0x700) {
-            self.device.application_mut().trial.is_addressed = true;
+            application.trial.is_addressed |= application.authorisation.is_open();
         }
     }
 

@@ -37,7 +37,7 @@ impl Copy {
     pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         if !self.rest.is_empty() {
             self.copy_chunk(flash)?;
-        } else if self.crc.step(flash, |_| ()).map_err(|_| Refusal::Write)? {
+        } else if self.crc.step(flash, &mut |_| ()).map_err(|_| Refusal::Write)? {
             self.write_header(flash)?;
             return Ok(true);
         }

@@ -48,7 +48,7 @@ impl Erase {
 
     fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         let mut erased = true;
-        self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
+        self.rest.start = read_step(flash, self.rest.clone(), &mut |bytes| {
             erased &= all_are(bytes, 0xFF);
         })?;
         if erased { Ok(self.rest.is_empty()) } else { Err(Refusal::NotCleared) }

@@ -63,10 +63,11 @@ pub(crate) const STEP: u32 = 4 * CHUNK_LEN;
 
 /// Gives `range` to `take` in pieces of at most [`CHUNK`] bytes, as far as one step goes. Returns the place to continue
 /// at.
+#[inline(never)] // Many callers, and little room in flash.
 pub(crate) fn read_step<F: Flash>(
     flash: &mut F,
     range: core::ops::Range<u32>,
-    mut take: impl FnMut(&[u8]),
+    take: &mut dyn FnMut(&[u8]),
 ) -> Result<u32, Refusal> {
     let end = range.end.min(range.start.saturating_add(STEP));
     let mut at = range.start;

@@ -56,9 +56,9 @@ impl CrcCheck {
     pub(crate) fn step<F: Flash>(
         &mut self,
         flash: &mut F,
-        mut also: impl FnMut(&[u8]),
+        also: &mut dyn FnMut(&[u8]),
     ) -> Result<bool, Refusal> {
-        self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
+        self.rest.start = read_step(flash, self.rest.clone(), &mut |bytes| {
             self.digest.update(bytes);
             also(bytes);
         })?;
@@ -130,7 +130,7 @@ impl FullCheck {
 
     fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
         let message = &mut self.message;
-        if !self.crc.step(flash, |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
+        if !self.crc.step(flash, &mut |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
             return Ok(None);
         }
         let Some(message) = message else { return Ok(Some(self.header)) };

@@ -93,7 +93,9 @@ impl Trial {
             return Err(Refusal::Unspecified);
         }
         // A cut may have left a mark that reads as set now and not later: the image would be copied once more.
-        staged(layout).done(flash)?;
+        if staged(layout).read(flash) == Commit::Done {
+            staged(layout).done(flash)?;
+        }
         kept(layout).done(flash)
     }
 

@@ -24,6 +24,7 @@ mod module_cycles;
 mod object_tables;
 mod personalities;
 mod pressure_node;
+mod program_gate;
 mod program_trial;
 mod storing;
 mod stuck_client;

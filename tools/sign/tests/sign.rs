@@ -3,7 +3,7 @@
 use bsp::update_layout::LAYOUT;
 use sign::image::Image;
 use sign::{code, key};
-use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_DEVELOPMENT_KEY, PUBLIC_KEYS};
+use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_PUBLISHED_KEY, PUBLIC_KEYS};
 use update::mock::MockFlash;
 use update::{Decision, Description, HEADER_LEN, Next, Start, Status, Target, Updater, Version, boot};
 
@@ -64,7 +64,7 @@ fn the_development_key_is_the_one_in_the_file_and_in_the_bootloader() {
     assert_eq!(key.verifying_key().to_bytes(), DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, "{}", key::variable(&key));
     assert!(key::is_development(&key));
     assert!(!key::is_development(&key::random().unwrap()));
-    assert!(HAS_DEVELOPMENT_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 2]);
+    assert!(HAS_PUBLISHED_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 2]);
 }
 
 #[test]

@@ -123,12 +123,14 @@ pub trait Application {
     /// are discarded, and the group has its defaults.
     fn loaded(&mut self, _group: Group, _good: bool) {}
 
-    /// A client wants to stop or to reset the program (1F51h, CiA 302-3). The device then stops its present operation.
+    /// Whether an SDO client may write this entry now, for example stop the program (1F51h, CiA 302-3). Called before
+    /// type and limits are checked. A domain that arrives in several parts asks
+    /// [`write_domain`](Application::write_domain) only.
     ///
     /// # Errors
-    /// The reason to refuse the command. An application that has to identify the client first returns
+    /// The reason to refuse the write; nothing changes then. An application that has to identify the client first returns
     /// [`Abort::DeviceState`] until then.
-    fn stop_program(&mut self) -> Result<(), Abort> {
+    fn admits(&self, _entry: &Entry) -> Result<(), Abort> {
         Ok(())
     }
 

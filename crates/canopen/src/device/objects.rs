@@ -40,6 +40,7 @@ impl<B: Body> Objects for B {
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
+        self.basic().application.admits(entry)?;
         if entry.is_domain() {
             return write_domain(self, at, bytes);
         }

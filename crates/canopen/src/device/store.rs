@@ -204,7 +204,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
         match value {
             STOP_PROGRAM | RESET_PROGRAM => {
-                self.basic.application.stop_program()?;
                 self.basic.pending.ask(Action::Bootloader);
                 self.jobs.is_deferred = true;
                 Ok(())

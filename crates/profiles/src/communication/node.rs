@@ -63,7 +63,7 @@ pub const PROGRAM_STATE: u16 = 0x2004;
 /// 2004h: facts about the board and its programs, for the master of an update.
 pub const PROGRAM_STATE_ROWS: &[Object] = &[
     Object::highest(PROGRAM_STATE, 1, "Program state"),
-    Object::new(PROGRAM_STATE, 1, "Board", Type::Unsigned32, Access::Const).value(product::BOARD as i64),
+    Object::new(PROGRAM_STATE, 1, "Board", Type::Unsigned32, Access::ReadOnly).value(product::BOARD as i64),
 ];
 
 /// Index of the object that counts lost events.

@@ -18,6 +18,7 @@ pub(super) const DATA: Multiplexer = Multiplexer { index: 0x1F50, sub: 1 };
 pub(super) const CONTROL: Multiplexer = Multiplexer { index: 0x1F51, sub: 1 };
 pub(super) const IDENTIFICATION: Multiplexer = Multiplexer { index: 0x1F56, sub: 1 };
 pub(super) const STATUS: Multiplexer = Multiplexer { index: 0x1F57, sub: 1 };
+pub(super) const TRIAL_COMMAND: Multiplexer = Multiplexer { index: 0x2002, sub: 2 };
 pub(super) const DEVICE_TYPE: Multiplexer = Multiplexer { index: 0x1000, sub: 0 };
 /// 'BOOT'.
 pub(super) const BOOT: [u8; 4] = 0x424F_4F54_u32.to_le_bytes();
@@ -176,6 +177,12 @@ impl Bench {
             }
         }
         panic!("the program does not run: 1F51h reads {:?}", self.read(CONTROL));
+    }
+
+    /// Confirms the program on trial.
+    pub(crate) fn confirm(&mut self) {
+        Client::new(self).write(TRIAL_COMMAND, b"conf").unwrap();
+        self.run(Time::from_millis(100));
     }
 
     /// The complete update sequence of a master.

@@ -152,6 +152,7 @@ fn an_image_with_a_lower_counter_is_refused() {
     let older = signed(code[..LENGTH].to_vec(), |about| about.counter = 2);
     let mut bench = Bench::running();
     bench.update(&newer);
+    bench.confirm();
     bench.stop();
     bench.clear();
     let _ = bench.download(&older.to_bytes());

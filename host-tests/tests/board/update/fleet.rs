@@ -139,6 +139,36 @@ fn one_image_updates_every_personality() {
     }
 }
 
+/// Runs a command of `nodectl` on a node; returns its report or the error.
+fn nodectl(world: &Shared, node: u8, command: &str) -> Result<Value, String> {
+    let node = node.to_string();
+    let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", &node, command];
+    let (printed, result) = run(world, &Cli::try_parse_from(line).unwrap(), |_| ());
+    result.map_err(|failure| failure.to_string())?;
+    Ok(serde_json::from_str(&printed).unwrap())
+}
+
+#[test]
+fn nodectl_confirms_a_program_on_trial_or_rolls_it_back() {
+    let (a, b) = (version_a(), version_b(0));
+    for (personality, kbit) in PERSONALITIES.into_iter().zip([1000, 125, 250, 500]) {
+        let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
+        for command in ["confirm", "rollback"] {
+            assert_eq!(nodectl(&world, 16, command).unwrap_err(), "node 16: its program is not on trial");
+        }
+        let left = ["--no-confirm"];
+        for (command, result, runs) in [("rollback", "rolled back", &a), ("confirm", "confirmed", &b)] {
+            let reports = try_update(&world, "16", &b, None, &left).unwrap();
+            assert_eq!(reports[0]["on_trial"], true, "{personality}");
+            let refusal = try_update(&world, "16", &a, None, &left).unwrap_err();
+            assert!(refusal.contains("its program is on trial"), "{personality}: {refusal}");
+            let report = nodectl(&world, 16, command).unwrap();
+            assert_eq!(report["result"], result, "{personality}");
+            assert_eq!(report["identification"], runs.header.code_crc(), "{personality}");
+        }
+    }
+}
+
 /// `nodectl` refuses the image before the node is touched, with `--force` too. Without the check of `nodectl` the
 /// bootloader refuses it.
 #[test]

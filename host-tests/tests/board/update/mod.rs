@@ -36,6 +36,7 @@ fn the_application_reads_its_identification_from_its_header() {
 fn a_node_is_updated_to_b_and_back() {
     let mut bench = Bench::running();
     bench.update(&version_b(0));
+    bench.confirm();
     bench.update(&version_a());
     assert_eq!(bench.world.summary(1.0, 0).bus.errors, 0);
 }

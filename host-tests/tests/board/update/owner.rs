@@ -62,6 +62,7 @@ fn one_of_its_keys_revokes_the_other_one() {
     let first = signed_by_owner(&version_a(), 0, 0);
     assert!(take(&mut bench, &first));
     assert_eq!(bench.start(), first.header.code_crc());
+    bench.confirm();
     bench.stop();
     let second = signed_by_owner(&version_b(0), 1, 1);
     assert!(take(&mut bench, &second));

@@ -7,7 +7,8 @@ use host_tests::thorough::either;
 use sign::image::Image;
 use update::Status;
 
-use super::bench::{Bench, START, signed, version_a, version_b};
+use super::bench::{Bench, CLEAR, START, signed, version_a, version_b};
+use super::fleet::PERSONALITIES;
 use crate::support::SECOND;
 
 const fn trial(sub: u8) -> Multiplexer {
@@ -155,6 +156,31 @@ fn a_master_confirms_a_program_or_takes_it_back_and_nothing_is_stored_before() {
     assert_eq!(state(&mut bench), NONE);
     write(&mut bench, SAVE, b"save").unwrap();
     assert_eq!(write(&mut bench, COMMAND, b"back"), Err(Failure::Refused(0x0800_0022)), "there is no trial");
+}
+
+/// The bootloader refuses the next update until the trial is decided, and the trial is as before.
+#[test]
+fn a_second_update_during_a_trial_is_refused_and_ends_nothing() {
+    const ON_TRIAL: u8 = 73;
+    for (personality, node) in PERSONALITIES.into_iter().zip([1, 16, 127, 1]) {
+        let mut bench = Bench::new(&format!("--bitrate 500 --node {node}:{personality}"), 500_000, node);
+        bench.run(SECOND);
+        bench.update(&version_b(0));
+        bench.stop();
+        assert_eq!(bench.command(CLEAR), Err(Failure::Refused(0x0800_0022)), "{personality}");
+        assert_eq!(bench.status().code, ON_TRIAL);
+        assert!(bench.download(&version_a().to_bytes()).is_err(), "{personality}");
+        assert_eq!(bench.start(), version_b(0).header.code_crc());
+        assert_eq!(state(&mut bench), OPEN, "{personality}");
+        write(&mut bench, COMMAND, b"back").unwrap();
+        bench.run(SECOND * 3);
+        assert_a_is_back(&mut bench, BACK, 2);
+        // The kept image of the next trial is the program that ran before it.
+        bench.update(&version_b(0));
+        write(&mut bench, COMMAND, b"back").unwrap();
+        bench.run(SECOND * 3);
+        assert_a_is_back(&mut bench, BACK, 2);
+    }
 }
 
 /// One program is confirmed, the other one is withdrawn, independently. The two nodes have different personalities.

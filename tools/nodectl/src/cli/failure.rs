@@ -169,7 +169,10 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
         update::Error::Flash { .. } | update::Error::Identification { .. } => 5,
-        update::Error::Board { .. } | update::Error::Older { .. } => 6,
+        update::Error::Board { .. }
+        | update::Error::Older { .. }
+        | update::Error::OnTrial { .. }
+        | update::Error::NoTrial { .. } => 6,
     }
 }
 

@@ -24,6 +24,7 @@ mod session;
 mod sheets;
 mod store;
 mod trace;
+mod trial;
 mod update;
 mod write;
 
@@ -70,6 +71,8 @@ enum Command {
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Confirm(trial::Confirm),
+    Rollback(trial::Rollback),
     Serve(serve::Serve),
     Check(check::Check),
     Completions(manual::Completions),
@@ -131,6 +134,8 @@ impl Cli {
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Confirm(confirm) => confirm.run(session),
+            Command::Rollback(rollback) => rollback.run(session),
             Command::Serve(_) => Err(Failure::Usage("it has sessions of its own".to_owned())),
             Command::Check(check) => check.run(session),
             Command::Completions(completions) => completions.run(session),

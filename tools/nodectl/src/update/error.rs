@@ -63,6 +63,18 @@ pub enum Error {
         /// The node.
         node: NodeId,
     },
+    /// The program of the node is on trial, so the node accepts no other program. Nothing was changed.
+    #[error("node {}: its program is on trial; confirm it or roll it back first (nodectl confirm, nodectl rollback)", .node.get())]
+    OnTrial {
+        /// The node.
+        node: NodeId,
+    },
+    /// The program of the node is on no trial, so there is nothing to confirm or to roll back.
+    #[error("node {}: its program is not on trial", .node.get())]
+    NoTrial {
+        /// The node.
+        node: NodeId,
+    },
     /// The node has not stopped, started or finished in time.
     #[error("node {}: it does not {what}", .node.get())]
     Stuck {

@@ -4,20 +4,20 @@ use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
 
 use super::image::version;
-use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher};
+use ::update::Refusal;
+
+use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher, trial};
 use crate::bus::BusError;
 use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::{Network, value};
 
-/// The time between two requests to a busy node.
-const POLL: Duration = Duration::from_millis(100);
 /// How long a node may take to restart.
 const RESTART: Duration = Duration::from_millis(15_000);
+/// The time between two requests to a busy node.
+pub(super) const POLL: Duration = Duration::from_millis(100);
 /// How long a node may take to erase the flash, or to check the program.
 const FLASH: Duration = Duration::from_millis(60_000);
-/// How long a node may take to end a trial.
-const CONFIRM: Duration = Duration::from_millis(5_000);
 /// The number of tries to clear the flash when the node refuses although its flash is not busy.
 const CLEARS: usize = 5;
 /// How often a run continues after the node was lost.
@@ -155,25 +155,17 @@ impl<'a> Job<'a> {
         }
         watcher.step(self.node, Step::Confirm);
         self.open(network)?;
-        self.program(network).confirm()?;
-        let until = network.now() + CONFIRM;
-        while self.program(network).is_on_trial()? {
-            if network.now() >= until {
-                return Err(Error::Stuck { node: self.node, what: "confirm the new program" });
-            }
-            network.pause(POLL)?;
-        }
+        trial::confirm(network, self.node, self.options.sdo)?;
         Ok(false)
     }
 
     /// Answers the challenge of a node that demands an authorisation.
     fn open(&self, network: &mut Network) -> Result<(), Error> {
         // Object 2003h is only known for nodes of this project.
-        if self.image.info.is_none() || !self.program(network).is_closed()? {
+        if self.image.info.is_none() {
             return Ok(());
         }
-        let key = self.options.key.as_ref().ok_or(Error::Closed { node: self.node })?;
-        Ok(self.program(network).open(key)?)
+        trial::open(network, self.node, self.options.sdo, self.options.key.as_ref())
     }
 
     /// The error of a node that runs another program than the new one. A node that has taken the new program back tells
@@ -210,6 +202,10 @@ impl<'a> Job<'a> {
         is_running: bool,
         watcher: &mut dyn Watcher,
     ) -> Result<(), Error> {
+        // Object 2002h is only known for nodes of this project.
+        if is_running && self.image.info.is_some() && self.program(network).is_on_trial()? {
+            return Err(Error::OnTrial { node: self.node });
+        }
         self.open(network)?;
         if is_running {
             watcher.step(self.node, Step::Stop);
@@ -243,6 +239,9 @@ impl<'a> Job<'a> {
         let until = network.now() + FLASH;
         let mut tries = CLEARS;
         while let Err(error) = self.program(network).command(Command::Clear) {
+            if self.program(network).status()?.is_some_and(is_on_trial) {
+                return Err(Error::OnTrial { node: self.node });
+            }
             tries -= 1;
             let is_late = network.now() >= until;
             if tries == 0 || is_late || error.abort().is_none() {
@@ -305,15 +304,7 @@ impl<'a> Job<'a> {
         wanted: bool,
         what: &'static str,
     ) -> Result<(), Error> {
-        let until = network.now() + RESTART;
-        while network.now() < until {
-            match self.program(network).is_running() {
-                Ok(is_running) if is_running == wanted => return Ok(()),
-                Err(error) if !error.is_silence() => return Err(error.into()),
-                _ => network.pause(POLL)?,
-            }
-        }
-        Err(Error::Stuck { node: self.node, what })
+        wait_until_running(network, self.node, self.options.sdo, wanted, what)
     }
 
     /// Waits for a lost node. Opens the bus again if the bus is lost, too.
@@ -380,6 +371,25 @@ impl<'a> Job<'a> {
     }
 }
 
+/// Waits until a node is back from a restart, with or without a running program as `wanted`.
+pub(super) fn wait_until_running(
+    network: &mut Network,
+    node: NodeId,
+    options: sdo::Options,
+    wanted: bool,
+    what: &'static str,
+) -> Result<(), Error> {
+    let until = network.now() + RESTART;
+    while network.now() < until {
+        match Program::new(network, node, options).is_running() {
+            Ok(is_running) if is_running == wanted => return Ok(()),
+            Err(error) if !error.is_silence() => return Err(error.into()),
+            _ => network.pause(POLL)?,
+        }
+    }
+    Err(Error::Stuck { node, what })
+}
+
 /// Tries to open the bus. After a failure it pauses, because the bus may come back; the caller limits the whole time.
 fn reopen(network: &mut Network) {
     if network.reopen().is_err() {
@@ -390,6 +400,11 @@ fn reopen(network: &mut Network) {
 /// Whether a status means a valid program that can be started.
 fn is_good(status: Status) -> bool {
     status == Status::GOOD
+}
+
+/// Whether a status means that the program has to be confirmed or taken back first.
+fn is_on_trial(status: Status) -> bool {
+    status.code == Refusal::OnTrial.code()
 }
 
 /// Whether a status means a flash without a program: no error, or no valid program.

@@ -144,6 +144,14 @@ impl<'n> Program<'n> {
         self.client(self.options).download(TRIAL_COMMAND, b"conf", |_| ()).map_err(named)
     }
 
+    /// Withdraws the running program. The node restarts a moment later and restores the previous program.
+    ///
+    /// # Errors
+    /// SDO errors.
+    pub fn roll_back(&mut self) -> Result<(), Error> {
+        self.client(self.options).download(TRIAL_COMMAND, b"back", |_| ()).map_err(named)
+    }
+
     /// Sends a command that the node acknowledges.
     ///
     /// # Errors

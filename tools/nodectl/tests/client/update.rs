@@ -146,6 +146,9 @@ fn a_program_on_trial_is_confirmed_unless_that_is_not_wanted() {
     let left = Options { confirm: false, force: true, ..options() };
     let outcome = one(&wire, &image(OLD), &left, &mut Diary::default()).unwrap();
     assert!(outcome.is_on_trial && wire.station(|loaders| loaders[0].flash().is_on_trial));
+    let error = one(&wire, &image(NEW), &options(), &mut Diary::default()).unwrap_err();
+    assert!(matches!(error, Error::OnTrial { .. }), "another program is refused: {error}");
+    assert_eq!(commands(&wire).last(), Some(&1), "the program runs");
     // A later update that finds the program on the node ends its trial.
     let outcome = one(&wire, &image(OLD), &options(), &mut Diary::default()).unwrap();
     assert!(!outcome.is_on_trial && !outcome.is_changed);
