@@ -7,7 +7,7 @@ use canopen::{Application, Part};
 use update::{AUTHORISATION_KEY, Authorisation, Proof, Refusal, Updater};
 
 use crate::dictionary::DICTIONARY;
-use crate::target::{PRODUCT, REVISION, TARGET, VENDOR};
+use crate::target::TARGET;
 
 /// Commands of 1F51h (CiA 302-3).
 const STOP: u8 = 0;
@@ -35,13 +35,15 @@ const AUTHORISATION: Option<[Field; 2]> = if AUTHORISATION_KEY.is_some() {
 pub(crate) struct Program {
     updater: Updater<ProgramFlash>,
     authorisation: Authorisation,
+    /// 1018h:2.
+    product: u32,
     /// The program was told to start, and may be started.
     starts: bool,
 }
 
 impl Program {
-    pub(crate) fn new(updater: Updater<ProgramFlash>, authorisation: Authorisation) -> Program {
-        Program { updater, authorisation, starts: false }
+    pub(crate) fn new(updater: Updater<ProgramFlash>, authorisation: Authorisation, product: u32) -> Program {
+        Program { updater, authorisation, product, starts: false }
     }
 
     pub(crate) fn updater(&mut self) -> &mut Updater<ProgramFlash> {
@@ -104,7 +106,7 @@ impl Application for Program {
 
     fn initialise(&mut self, image: &mut [u8]) {
         HARDWARE.set(image, board::NAME.as_bytes());
-        let identity = [VENDOR, PRODUCT, REVISION, factory::serial_number()];
+        let identity = [product::VENDOR_ID, self.product, product::REVISION, factory::serial_number()];
         for (field, value) in IDENTITY.into_iter().zip(identity) {
             field.store(image, value.to_le_bytes());
         }

@@ -66,8 +66,9 @@ impl Session {
             Reason::Copy => updater.install(),
             Reason::Revert => updater.revert(),
         };
+        let program = Program::new(updater, authorisation, identity.product);
         Session {
-            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater, authorisation)),
+            device: ServiceDevice::new(&DICTIONARY, identity.node_id, program),
             can,
             timing: identity.timing.unwrap_or(BitTiming::FASTEST),
             back_off: BackOff::default(),

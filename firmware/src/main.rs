@@ -113,10 +113,10 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, rate, boot_data, store, position_record } =
+        let Loaded { protocol, parameters, setup, rate, boot_data, memory, position_record } =
             configuration::load(board.parameters, cx.local.protocol);
         let job = cx.local.job.write(StoreJob::new(setup.personality));
-        let storage = StorageTask::new(store, job, StoredPositionRecord::new(position_record));
+        let storage = StorageTask::new(memory, job, StoredPositionRecord::new(position_record));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working(), boot_data };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
@@ -214,7 +214,6 @@ mod app {
 
     #[task(binds = CAN1_TX, priority = 4, local = [transmitter], shared = [transmit])]
     fn transmit(mut cx: transmit::Context) {
-        cx.local.transmitter.acknowledge();
         cx.shared.transmit.lock(|queue| queue.pump(cx.local.transmitter));
     }
 
@@ -241,10 +240,12 @@ mod app {
     #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
     fn store(mut cx: store::Context) {
         let mut node = (cx.shared.protocol, cx.shared.transmit);
-        cx.local.storage.judge(&mut node);
-        cx.local.storage.run(&mut node);
         let retained = cx.shared.retained.lock(|retained| *retained);
+        cx.local.storage.judge(&mut node);
+        cx.local.storage.watch_positions(&retained);
+        cx.local.storage.run(&mut node, cx.shared.watchdog);
         cx.local.storage.keep(&retained, &mut node);
+        cx.local.storage.make_room(&mut node, cx.shared.watchdog);
         cx.shared.watchdog.progress(Part::Storage);
     }
 }

@@ -25,17 +25,22 @@ BOOT_UP = b"\x00"
 
 
 class Simulator:
-    """The `sim` program with one pressure node, served on free ports."""
+    """The `sim` program with one pressure node, served on free ports.
+
+    The page runs beside it, as with a plain `cargo sim`: a client must not notice the page. `page` is its address; None
+    is for tests of a bus without it.
+    """
 
     #: The simulators that were started; the end of the session stops those that a failed test has left running.
     started: list["Simulator"] = []
 
-    def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader"):
+    def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader", page: str | None = "127.0.0.1:0"):
         images = Path(os.environ["NODE_IMAGES"])
         for name in (bootloader, "firmware"):
             assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images --development` builds it"
         command = [os.environ["SIM_COMMAND"], "--bootloader", images / bootloader, "--firmware", images / "firmware"]
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
+<<<<<<< HEAD
         self.log = Path(flags[flags.index("--candump") + 1]) if "--candump" in flags else self._own_log()
         if "--candump" not in flags:
             command += ["--candump", self.log]
@@ -44,6 +49,9 @@ class Simulator:
         self.is_new = "--flash" not in flags
         self.expected: set[str] = set()
         self.is_judged = False
+=======
+        command += ["--page-program", os.environ["NODECTL_COMMAND"], *(["--page", page] if page else ["--no-page"])]
+>>>>>>> with-monitor
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)
         # The first line lists the served addresses.

@@ -2,11 +2,15 @@
 
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
+use embedded_storage::nor_flash::NorFlash;
+use node::{
+    BitRate, BusEvent, EraseBudget, Fault, Identity, Measurement, ParameterMemory, Personality, Protocol,
+    Setup, StoreJob,
+};
 use monitor::{Incident, Sender};
-use node::{BitRate, BusEvent, Fault, Identity, Measurement, Personality, Protocol, Setup, StoreJob};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
-use storage::{DeviceRecord, Memory, Pages, Store, View};
+use storage::{DeviceRecord, Memory, Pages, View};
 
 use crate::sdo::{Channel, Client, Failure};
 use crate::watch::{Answers, Watch, sheet};
@@ -61,10 +65,13 @@ pub struct Bench {
 }
 
 /// The parameter store in RAM.
-pub type Flash = Store<Memory<Vec<u8>>>;
+pub type Flash = ParameterMemory<Memory<Vec<u8>>>;
 
-const PAGES: Pages = Pages::new(0, 4 * 1024);
-const ERASED: [u8; 8 * 1024] = [0xFF; 8 * 1024];
+/// The pages of the board (memory.x).
+pub const PAGES: Pages = Pages::new(0, 16 * 1024);
+const ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
+/// The longest time for which the erase of a page stops the core.
+pub const ERASE: Duration = Duration::from_millis(500);
 
 /// A setup with recognisable values.
 #[must_use]
@@ -124,7 +131,8 @@ pub fn intact() -> PowerOn {
 /// When the store cannot be prepared.
 #[must_use]
 pub fn empty_store() -> Flash {
-    Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
+    let view = View::open(Memory(ERASED.to_vec()), PAGES).expect("pages");
+    ParameterMemory::prepare(view, EraseBudget::new(None)).expect("a store")
 }
 
 /// The store job that the node requests; `None` without a request.
@@ -144,9 +152,18 @@ pub fn take_job(protocol: &mut Protocol, now: Instant, out: &mut impl Transmit) 
 /// Carries out the store job of the node at once.
 pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
     if let Some(mut job) = take_job(protocol, now, out) {
-        let result = job.run(store);
+        let result = store.run(&mut job);
+        keep_room(protocol, store, now);
         let _ = protocol.finish(&job, result, now, out);
     }
+}
+
+/// Erases a page if one is used up and a pause disturbs no service, and reports the state of the memory.
+pub fn keep_room<F: NorFlash>(protocol: &mut Protocol, store: &mut ParameterMemory<F>, now: Instant) {
+    if store.can_make_room(now) && protocol.can_pause(ERASE, now) {
+        let _ = store.make_room();
+    }
+    protocol.show_memory(store.state());
 }
 
 impl Bench {
@@ -167,6 +184,19 @@ impl Bench {
         let mut watch = Watch::without_bus();
         watch.monitor().set_sheet(0, sheet(setup.personality), true);
         Bench::start(ERASED.to_vec(), setup, power_on, watch)
+    }
+
+    /// A node of this personality and node-ID that has booted.
+    #[must_use]
+    pub fn booted_at(personality: Personality, node_id: u8) -> Bench {
+        let setup = Setup { personality, node_id: NodeId::new(node_id), ..setup() };
+        Bench::new_with(&setup, intact())
+    }
+
+    /// The node-ID, as the number that is added to a function code.
+    #[must_use]
+    pub fn id(&self) -> u16 {
+        self.protocol.node_id().map_or(0, NodeId::get).into()
     }
 
     /// A node that has booted with this content of its parameter pages.
@@ -194,7 +224,7 @@ impl Bench {
             measurement: Measurement::new(setup.personality, &power_on),
             out: Queue::default(),
             now: Instant(0),
-            store: Store::prepare(view).expect("a store"),
+            store: ParameterMemory::prepare(view, EraseBudget::new(None)).expect("a store"),
             encoder: RawEncoder::default(),
             buttons: [false; 2],
             setup: *unless_stored,
@@ -205,6 +235,7 @@ impl Bench {
             due: Instant(0),
             stores_later: false,
         };
+        bench.protocol.show_memory(bench.store.state());
         let monitor = bench.watch.monitor();
         if !monitor.has_sheet(0) {
             monitor.set_sheet(0, sheet(setup.personality), false);
@@ -243,10 +274,10 @@ impl Bench {
     /// Boots, or boots again after a reset.
     pub fn restart(&mut self) {
         self.watch.incident(self.now, 0, Incident::Restart);
-        let next = self.protocol.start(self.now, &mut self.out);
         if let Some(fault) = self.boot_data {
             let _ = self.protocol.set_fault(fault, true, self.now);
         }
+        let next = self.protocol.start(self.now, &mut self.out);
         self.keep(next);
         self.observe();
     }
@@ -351,7 +382,8 @@ impl Bench {
 
     /// An NMT command for this node.
     pub fn nmt(&mut self, command: u8) {
-        self.receive(&Frame::new(0, &[command, ID]).expect("a frame"));
+        let [node_id, _] = self.id().to_le_bytes();
+        self.receive(&Frame::new(0, &[command, node_id]).expect("a frame"));
     }
 
     /// Does all work that is due and returns the next deadline.
@@ -427,11 +459,12 @@ impl Bench {
 /// The SDO channel; the node answers at once or not at all.
 impl Channel for Bench {
     fn send(&mut self, request: [u8; 8]) {
-        self.receive(&Frame::new(0x600 + u16::from(ID), &request).expect("a frame"));
+        self.receive(&Frame::new(0x600 + self.id(), &request).expect("a frame"));
     }
 
     fn received(&mut self) -> Option<[u8; 8]> {
-        let place = self.out.0.iter().position(|frame| frame.id() == 0x580 + u16::from(ID))?;
+        let response = 0x580 + self.id();
+        let place = self.out.0.iter().position(|frame| frame.id() == response)?;
         self.out.0.remove(place).data().try_into().ok()
     }
 

@@ -51,11 +51,13 @@ pub type Banks = Vec<Bank, BANKS>;
 
 /// Packs identifiers into banks; identifiers of process data come with a mask of the bits to compare. If they do not
 /// fit, the last bank passes every base frame to FIFO 1 and the protocol sorts the frames out, so no frame is lost.
+/// Process data always fit: see the assertion.
 pub fn pack(process: impl Iterator<Item = (u16, u16)>, services: impl Iterator<Item = u16>) -> Banks {
     let mut banks = Banks::new();
     let process = process.map(|(id, mask)| Pair { id, mask });
-    let complete = fill(&mut banks, Fifo::Process, process)
-        && fill(&mut banks, Fifo::Services, services.map(Pair::exactly));
+    let has_process = fill(&mut banks, Fifo::Process, process) && !banks.is_full();
+    debug_assert!(has_process, "the process data leave no bank for the services");
+    let complete = has_process && fill(&mut banks, Fifo::Services, services.map(Pair::exactly));
     if !complete {
         banks.pop();
         let _ = banks.push(EVERYTHING);

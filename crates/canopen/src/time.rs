@@ -27,8 +27,8 @@ impl Duration {
     }
 }
 
-/// Microseconds since start-up. 64 bits do not overflow in the life of a machine. Do not add to
-/// [`NEVER`](Instant::NEVER): the sum is meaningless.
+/// Microseconds since start-up. 64 bits do not overflow in the life of a machine. A sum beyond the range is
+/// [`NEVER`](Instant::NEVER).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(pub u64);
@@ -41,6 +41,17 @@ impl Instant {
 impl Add<Duration> for Instant {
     type Output = Instant;
     fn add(self, span: Duration) -> Instant {
-        Instant(self.0.wrapping_add(span.0))
+        Instant(self.0.saturating_add(span.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_span_after_never_is_never() {
+        assert_eq!(Instant::NEVER + Duration::from_millis(1), Instant::NEVER);
+        assert_eq!(Instant(u64::MAX - 1) + Duration(5), Instant::NEVER);
     }
 }

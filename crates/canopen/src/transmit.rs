@@ -1,5 +1,6 @@
 //! The transmit queue of the driver as the protocols use it.
 
+use crate::pdo::Budget;
 use crate::{Duration, Frame, Instant};
 
 /// The queue has no room. The sender keeps the frame and tries again.
@@ -15,8 +16,8 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold about twenty frames: a block upload leaves room for ten others, on
-/// a [`ServiceDevice`](crate::ServiceDevice) for two.
+/// A transmit queue. It never blocks. It should hold about twenty frames: PDOs leave room for four other frames, events
+/// among them for twelve, a block upload for ten, on a [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
     /// Queues one frame.
     ///
@@ -53,6 +54,8 @@ pub struct Context<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
+    /// The share of process data in the bus. Services have none, and are not limited.
+    pub(crate) budget: Option<&'a mut Budget>,
 }
 
 impl<T: Transmit> Context<'_, T> {
@@ -71,11 +74,52 @@ impl<T: Transmit> Context<'_, T> {
         self.is_open && self.out.send_state(frame).is_ok()
     }
 
+    /// Queues a PDO with present values, which a newer one may replace. `false` when there is no room beside the services,
+    /// or the process data have taken their share of the bus.
+    pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
+        self.room() > ROOM_FOR_SERVICES && self.admits(&frame) && self.send_state(frame) && self.spend(&frame)
+    }
+
+    /// Queues a multiplexed PDO. `false` when there is no room beside all others, or no share of the bus is left.
+    pub(crate) fn send_multiplexed(&mut self, frame: Frame) -> bool {
+        self.has_room_for_event() && self.admits(&frame) && self.send(frame) && self.spend(&frame)
+    }
+
+    /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it. `false` when there is
+    /// no room beside all others.
+    pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
+        self.has_room_for_event() && self.send(frame) && self.spend(&frame)
+    }
+
+    /// Whether `send_event` would take a frame now.
+    pub(crate) fn has_room_for_event(&self) -> bool {
+        self.room() > ROOM_FOR_OTHERS
+    }
+
+    fn admits(&mut self, frame: &Frame) -> bool {
+        let now = self.now;
+        self.budget.as_mut().is_none_or(|budget| budget.admits(frame.id(), frame.len(), now))
+    }
+
+    fn spend(&mut self, frame: &Frame) -> bool {
+        if let Some(budget) = &mut self.budget {
+            budget.spend(frame.len());
+        }
+        true
+    }
+
     /// How many frames `send` would take now.
     pub(crate) fn room(&self) -> usize {
         if self.is_open { self.out.room() } else { 0 }
     }
 }
+
+/// Free places that PDOs leave in the queue: for a heartbeat, an EMCY, an SDO response and an LSS response.
+const ROOM_FOR_SERVICES: usize = 4;
+
+/// Free places that events leave in the queue. The bus may be busy for minutes, but events can wait in the application.
+/// A block upload, which leaves fewer places, continues beside them.
+const ROOM_FOR_OTHERS: usize = 12;
 
 /// When to try again after `QueueFull`.
 pub(crate) const RETRY: Duration = Duration::from_millis(1);

@@ -47,10 +47,15 @@ impl ProgramTrial {
     fn state(&self) -> u8 {
         match self.state {
             Trial::None => 0,
-            Trial::Open | Trial::Lost(_) => 1,
+            Trial::Begun | Trial::Open | Trial::Lost(_) => 1,
             Trial::Over(Reason::Starts) => 2,
             Trial::Over(Reason::Withdrawn) => 3,
         }
+    }
+
+    /// Whether the program is still on trial.
+    pub(crate) fn is_open(&self) -> bool {
+        self.state == Trial::Open
     }
 
     /// Why the previous program was restored, in the codes of 1F57h; `None` if it was not.
@@ -85,7 +90,7 @@ impl Protocol {
     /// so that it finds its settings.
     #[must_use]
     pub fn is_on_trial(&self) -> bool {
-        self.device.application().trial.state == Trial::Open
+        self.device.application().trial.is_open()
     }
 
     /// Whether the previous program was restored, for a fault on the bus.

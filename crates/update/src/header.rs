@@ -41,8 +41,8 @@ impl fmt::Display for Version {
 /// Properties of an image, set by its maker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Description {
-    /// The product, as in 1018h:2.
-    pub product: u32,
+    /// The board, as in 2004h:1.
+    pub board: u32,
     /// The hardware revisions on which the image runs: bit n for revision n.
     pub hardware: u32,
     /// The version, for information only.
@@ -110,11 +110,11 @@ impl Header {
     /// The bytes before the signature.
     #[must_use]
     pub fn signed_part(&self) -> [u8; SIGNED_LEN] {
-        let Description { product, hardware, version, counter, key, revokes } = self.description;
+        let Description { board, hardware, version, counter, key, revokes } = self.description;
         let Version { major, minor, patch } = version;
         let number = u32::from(major) | u32::from(minor) << 16;
         let keys = u32::from(patch) | u32::from(key) << 16 | u32::from(revokes) << 24;
-        let words = [MAGIC, FORMAT, product, hardware, number, keys, self.length, self.code_crc, counter];
+        let words = [MAGIC, FORMAT, board, hardware, number, keys, self.length, self.code_crc, counter];
         let mut bytes = [0; SIGNED_LEN];
         bytes.as_chunks_mut().0.iter_mut().zip(words).for_each(|(to, word)| *to = word.to_le_bytes());
         bytes
@@ -153,11 +153,11 @@ impl Header {
         if (next(), next()) != (MAGIC, FORMAT) {
             return Err(Refusal::UnknownFormat);
         }
-        let (product, hardware, number, keys) = (next(), next(), next(), next());
+        let (board, hardware, number, keys) = (next(), next(), next(), next());
         let (length, code_crc, counter) = (next(), next(), next());
         let version = Version { major: low(number), minor: low(number >> 16), patch: low(keys) };
         let [_, _, key, revokes] = keys.to_le_bytes();
-        let description = Description { product, hardware, version, counter, key, revokes };
+        let description = Description { board, hardware, version, counter, key, revokes };
         let header = Header { description, length, code_crc, signature: signature_in(bytes) };
         header.agrees_with(bytes)
     }

@@ -224,7 +224,7 @@ fn a_supply_out_of_its_limits_and_a_damaged_memory_are_emergencies() {
         assert_eq!(number(&mut bench, 0x1003, 1), code.into());
         assert_eq!(bench.protocol.state(), State::PreOperational, "1029h:2 is 0");
         bench.encoder.board = good;
-        wait(&mut bench, 20);
+        wait(&mut bench, 120);
         assert_eq!(emergencies(&mut bench), [(0, 0, 0)]);
     }
 }

@@ -29,6 +29,7 @@ pub mod meaning;
 mod network;
 pub mod nmt;
 pub mod object;
+mod other_clients;
 mod pdo_parameters;
 pub mod quantity;
 pub mod rules;
@@ -42,4 +43,4 @@ pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
-pub use network::{Logged, Network};
+pub use network::{Heard, Logged, Network};

@@ -11,11 +11,11 @@ const SECTORS: [usize; 8] = [16, 16, 16, 16, 64, 128, 128, 128];
 
 fn description() -> Description {
     let version = Version { major: 1, minor: 2, patch: 3 };
-    Description { product: 0x8271, hardware: 1, version, counter: 1, ..Description::default() }
+    Description { board: 0x8271, hardware: 1, version, counter: 1, ..Description::default() }
 }
 
 fn target() -> Target {
-    Target { layout: LAYOUT, product: 0x8271, hardware: 0, keys: &PUBLIC_KEYS }
+    Target { layout: LAYOUT, board: 0x8271, hardware: 0, keys: &PUBLIC_KEYS }
 }
 
 /// Updates a node with the flash of the chip. Returns the value of 1F57h at the end.

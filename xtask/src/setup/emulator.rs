@@ -1,4 +1,4 @@
-//! The build tools of the emulator's CPU library, a C program with cmake: a C compiler, make, cmake, libclang.
+//! The build tools of the emulator: libclang, and a compiled CPU library or the cmake that compiles it.
 //!
 //! Each tool is looked for in the way of the build itself. Missing tools come from PyPI into the build directory,
 //! without root.
@@ -12,7 +12,7 @@ use anyhow::{Result, anyhow};
 
 use start::{Need, Package, runs};
 
-use super::{libclang, python, system};
+use super::{cpu_library, libclang, packages_in, python, system};
 use crate::command::{cargo, target_dir};
 
 /// A cargo call that can build the emulator.
@@ -54,10 +54,14 @@ fn make() -> Result<Vec<(OsString, OsString)>> {
     find().ok_or_else(|| anyhow!("cmake or libclang does not work here, although it is installed; LIBCLANG_PATH can name the directory of another libclang"))
 }
 
-/// The system's tools where they work, else the tools from PyPI of an earlier run.
+/// The system's tools where they work, else the tools from PyPI of an earlier run. A compiled CPU library needs no
+/// cmake.
 fn find() -> Option<Vec<(OsString, OsString)>> {
     let tools = from_pypi();
-    let path = cmake(&tools)?;
+    let path = match cpu_library::variable() {
+        Some(library) => Some(library),
+        None => cmake(&tools)?,
+    };
     let libclang = libclang::variables(None)
         .or_else(|| libclang::variables(Some(&packages_in(&tools)?.join("clang/native"))))?;
     let libclang = libclang.into_iter().map(|(name, value)| (name.into(), value.into()));
@@ -92,10 +96,4 @@ fn from_package_manager() -> Vec<Package> {
 
 fn from_pypi() -> PathBuf {
     target_dir().join("build-tools")
-}
-
-/// The directory of an environment's packages, whose parent is named after the version of Python.
-fn packages_in(environment: &Path) -> Option<PathBuf> {
-    let versions = environment.join("lib").read_dir().ok()?;
-    versions.flatten().map(|version| version.path().join("site-packages")).find(|path| path.is_dir())
 }

@@ -5,10 +5,13 @@
 //! only be installed by the system's package manager, and this user may not run it, the error contains the one command
 //! that installs everything. After the check each need is installed where it is used.
 
+mod cpu_library;
 pub(crate) mod emulator;
 mod libclang;
 pub(crate) mod python;
 pub(crate) mod system;
+
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use start::Package;
@@ -50,4 +53,10 @@ pub(crate) fn run(dry: bool) -> Result<()> {
     python::clients()?;
     println!("everything is there");
     Ok(())
+}
+
+/// The directory of an environment's packages, whose parent is named after the version of Python.
+fn packages_in(environment: &Path) -> Option<PathBuf> {
+    let versions = environment.join("lib").read_dir().ok()?;
+    versions.flatten().map(|version| version.path().join("site-packages")).find(|path| path.is_dir())
 }

@@ -17,6 +17,8 @@ struct Retained {
     bootloader: AtomicU32,
     /// A mark that says whether the rest is valid, then challenge and response.
     authorisation: [AtomicU32; 5],
+    /// The erase budget of the parameter memory, and its complement.
+    erase_budget: [AtomicU32; 2],
 }
 
 /// `used` keeps the compiler from assuming the initial values, which a reset does not write.
@@ -29,6 +31,7 @@ static RETAINED: Retained = Retained {
     proven: [const { AtomicU32::new(0) }; 2],
     bootloader: AtomicU32::new(0),
     authorisation: [const { AtomicU32::new(0) }; 5],
+    erase_budget: [const { AtomicU32::new(0) }; 2],
 };
 
 /// The mark of a development bootloader: 'DEVL'.
@@ -111,6 +114,18 @@ pub fn set_authorisation(pair: &Pair) {
 pub fn forget_authorisation() {
     let [mark, ..] = &RETAINED.authorisation;
     mark.store(0, Ordering::Relaxed);
+}
+
+/// What the run before has left of the erase budget; `None` after a loss of power.
+#[must_use]
+pub fn erase_budget() -> Option<u16> {
+    let [budget, complement] = load(&RETAINED.erase_budget);
+    if complement == !budget { u16::try_from(budget).ok() } else { None }
+}
+
+/// Keeps the erase budget for the next start.
+pub fn set_erase_budget(budget: u16) {
+    store(&RETAINED.erase_budget, [budget.into(), !u32::from(budget)]);
 }
 
 /// The words of the crash record.

@@ -72,10 +72,20 @@ pub trait Application {
         false
     }
 
-    /// The groups to store when an SDO client writes this entry, as a write to 1010h would. The SDO response is sent
-    /// when the groups are stored.
+    /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response
+    /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, the write is
+    /// refused and has no effect.
     fn stores(&self, _entry: &Entry) -> Option<Groups> {
         None
+    }
+
+    /// Whether a job can be stored now. Asked before the effect of every request that stores values. A job that runs
+    /// does not count: the answer must hold for one job more.
+    ///
+    /// # Errors
+    /// The reason to refuse the request, for example [`Abort::DeviceState`] while the memory has no room.
+    fn can_store(&self) -> Result<(), Abort> {
+        Ok(())
     }
 
     /// From now on, a TPDO with [`sends_events`](Application::sends_events) can be sent: the device has become

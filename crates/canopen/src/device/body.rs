@@ -1,7 +1,7 @@
 //! The interface between the services and the device behind them: the inner device, or the outer device around it.
 
 use super::basic::Basic;
-use super::{Application, STALE};
+use super::{Application, Job, STALE};
 use crate::dictionary::{Dictionary, Entry};
 use crate::lss::Configuration;
 use crate::nmt::State;
@@ -88,8 +88,14 @@ pub trait Body: Sized {
     /// Applies the new value of an entry with a rule.
     fn value_written(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
 
-    /// An SDO client has written the entry: stores the groups that the application wants stored at once.
-    fn store_at_once(&mut self, _entry: &Entry) -> Result<(), Abort> {
+    /// The job that a write to the entry by an SDO client begins, if the application wants groups stored at once. An
+    /// error refuses the write before it has an effect.
+    fn check_store(&self, _entry: &Entry) -> Result<Option<Job>, Abort> {
+        Ok(None)
+    }
+
+    /// Begins the job of `check_store`, after the write. The response to the client waits for its end.
+    fn store_at_once(&mut self, _job: Job) -> Result<(), Abort> {
         Ok(())
     }
 

@@ -57,10 +57,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.process_next()
     }
 
-    /// Reacts to an error of the application as object 1029h says.
+    /// Reacts to an error as object 1029h says, with the next poll of the services. A [`Condition`](crate::Condition)
+    /// with a class needs no such call: its fault is the error.
     pub fn error(&mut self, class: ErrorClass) -> Next {
-        self.body.apply_error(class);
-        self.silence_services();
+        self.body.emcy.add_error(class);
+        self.body.basic.services_due = STALE;
         self.process_next()
     }
 }
@@ -68,16 +69,41 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    pub(super) fn apply_error(&mut self, class: ErrorClass) {
-        self.basic.application.error(class, &mut self.basic.image);
-        let ErrorClass(sub) = class;
-        match self.basic().number(ERROR_BEHAVIOUR, sub) {
-            TO_PRE_OPERATIONAL if self.basic.state == State::Operational => {
+    /// Applies object 1029h to the errors since the last call. Called after the EMCYs, which give the reason.
+    ///
+    /// Stopped has no EMCY. A node that has to stop is therefore Pre-operational until its EMCYs are sent; after
+    /// bus-off, that is after the recovery.
+    pub(super) fn react(&mut self) {
+        for class in self.emcy.take_errors() {
+            self.basic.application.error(class, &mut self.basic.image);
+            let ErrorClass(sub) = class;
+            let behaviour = self.basic().number(ERROR_BEHAVIOUR, sub);
+            if self.basic.state == State::Operational && matches!(behaviour, TO_PRE_OPERATIONAL | TO_STOPPED)
+            {
                 self.enter(State::PreOperational);
             }
-            TO_STOPPED if self.basic.state.has_services() => self.enter(State::Stopped),
-            _ => (),
+            if self.basic.state.has_services() && behaviour == TO_STOPPED {
+                self.basic.pending.next_state = Some(State::Stopped);
+            }
         }
+        let has_to_stop = self.basic.pending.next_state == Some(State::Stopped);
+        if has_to_stop && self.emcy.is_idle() && !self.is_bus_off {
+            self.basic.pending.next_state = None;
+            self.enter(State::Stopped);
+        }
+    }
+
+    /// EMCY has been switched on: reports the active faults. Messages that have waited are older.
+    pub(super) fn report_active(&mut self, now: Instant) {
+        self.emcy.forget_waiting();
+        self.emcy.repeat_singles(now);
+        for number in self.watches.lost() {
+            self.emcy.repeat(Fault::Heartbeat(number), now);
+        }
+        for rpdo in &self.rpdos {
+            rpdo.active().for_each(|fault| self.emcy.repeat(fault, now));
+        }
+        self.basic.services_due = STALE;
     }
 
     /// Reports bus-off after the recovery: during bus-off, the node cannot send.

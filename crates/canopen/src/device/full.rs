@@ -4,7 +4,7 @@ use super::basic::Basic;
 use super::body::Body;
 use super::pdos::low_half;
 use super::state::SELF_START;
-use super::{Application, ErrorClass, Job, STALE, store};
+use super::{Application, Job, STALE, store};
 use crate::dictionary::{Dictionary, Entry, Group, Groups, Rule};
 use crate::lss::Configuration;
 use crate::nmt::State;
@@ -98,6 +98,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         } else {
             self.scanner.stop();
         }
+        if state == State::Initialising {
+            self.tpdos.iter_mut().for_each(Tpdo::reset);
+            self.scanner.reset();
+        }
         self.basic.process_due = STALE;
     }
 
@@ -107,15 +111,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     fn configure(&mut self, now: Instant) {
         self.configure_sync(now);
-        self.emcy.configure(self.basic().number_or(0x1014, 0, emcy::OFF));
-        self.emcy.set_inhibit(low_half(self.basic().number(0x1015, 0)));
+        let _ = self.emcy.configure(self.basic().number_or(0x1014, 0, emcy::OFF));
+        self.emcy.set_inhibit(low_half(self.basic().number(0x1015, 0)), now);
         self.configure_watches(now);
         self.configure_pdos(now);
         self.emcy.restart(now);
         self.report_stored(now);
         self.update_error_register();
         if self.basic().number(0x1F80, 0) == SELF_START {
-            self.basic.pending.self_start_state = Some(State::Operational);
+            self.basic.pending.next_state = Some(State::Operational);
         }
     }
 
@@ -133,14 +137,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.take_heartbeat(frame, now);
     }
 
+    #[inline(never)]
     fn poll_errors(&mut self, context: &mut Context<'_, impl Transmit>) {
         while let Some(change) = self.watches.expire(context.now) {
             self.on_watch(change, context.now);
-            self.apply_error(ErrorClass::COMMUNICATION);
         }
         if self.basic.state.has_services() {
             self.emcy.poll(context);
         }
+        self.react();
     }
 
     fn errors_due(&self) -> Instant {
@@ -164,11 +169,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.apply_value(entry, value, now);
     }
 
-    fn store_at_once(&mut self, entry: &Entry) -> Result<(), Abort> {
-        match self.basic.application.stores(entry) {
-            Some(groups) => self.begin_deferred(Job::Store(groups)),
-            None => Ok(()),
-        }
+    fn check_store(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
+        self.check_store_at_once(entry)
+    }
+
+    fn store_at_once(&mut self, job: Job) -> Result<(), Abort> {
+        self.begin_deferred(job)
     }
 
     fn store_configuration(&mut self, configuration: Configuration) -> bool {

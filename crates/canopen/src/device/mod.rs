@@ -96,6 +96,13 @@ impl<B: Body> Node<B> {
         self
     }
 
+    /// Reports the bit rate at which the bus runs. PDOs take at most three quarters of it, so that the heartbeat, EMCY and
+    /// SDO always have room. [`with_bit_rate`](Node::with_bit_rate) and a change by LSS set it too; a caller that detects
+    /// the bit rate sets it here.
+    pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.services.set_bus_bit_rate(bit_rate);
+    }
+
     /// The node-ID in use.
     #[must_use]
     pub fn node_id(&self) -> Option<NodeId> {

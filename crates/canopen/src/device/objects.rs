@@ -46,6 +46,7 @@ impl<B: Body> Objects for B {
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(value)?;
+        let job = self.check_store(entry)?;
         match entry.rule() {
             Rule::Plain => entry.field.set_number(&mut self.basic_mut().image, value, bytes),
             _ => write_by_rule(self, entry, value, bytes, now)?,
@@ -55,7 +56,7 @@ impl<B: Body> Objects for B {
             basic.pending.parameters_changed();
         }
         basic.application.written(entry, &mut basic.image);
-        self.store_at_once(entry)
+        job.map_or(Ok(()), |job| self.store_at_once(job))
     }
 
     fn take_deferred(&mut self) -> bool {
@@ -140,8 +141,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
             }
-            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value)),
-            Rule::EmcyCobId => self.emcy.configure(value),
+            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value), now),
+            Rule::EmcyCobId if self.emcy.configure(value) => self.report_active(now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),
             Rule::PdoCobId

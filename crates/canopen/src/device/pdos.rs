@@ -170,7 +170,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             rpdo.links = self.first_rpdos;
             let Some(id) = rpdo.id() else { continue };
             self.rpdo_filter |= filter_bit(id.get());
-            if rpdo.is_multiplexed() && self.basic.application.takes_all_nodes((rpdo.index & 0x1FF) + 1) {
+            if rpdo.is_multiplexed() && self.basic.application.takes_all_nodes(rpdo.number()) {
                 self.rpdo_filter = u32::MAX;
                 self.all_nodes = u16::try_from(place).ok().map(|place| (id, place));
             }

@@ -6,7 +6,7 @@ use super::{Application, Device, Next, Node, STALE};
 use crate::nmt::Command;
 use crate::pdo::{Chain, Rpdo, Tpdo};
 use crate::transmit::Context;
-use crate::{CanId, Frame, Instant, Transmit};
+use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 impl<B: Body> Node<B> {
     /// Takes a frame for either half.
@@ -34,10 +34,12 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let context = &mut self.services.context(now, out);
-        if frame.id() == CanId::NMT.get() {
+        let is_nmt = frame.id() == CanId::NMT.get();
+        if is_nmt {
             self.on_nmt(frame);
-        } else if self.body.basic().state.has_pdos() {
+        }
+        let context = &mut self.services.process_context(now, out);
+        if !is_nmt && self.body.basic().state.has_pdos() {
             self.body.on_pdo_frame(frame, context);
         }
         self.body.send_process(context);
@@ -55,7 +57,7 @@ impl<B: Body> Node<B> {
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().process_due {
-            let context = &mut self.services.context(now, out);
+            let context = &mut self.services.process_context(now, out);
             self.body.send_process(context);
         }
         self.process_next()
@@ -81,7 +83,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
-        let context = &mut self.services.context(now, out);
+        let context = &mut self.services.process_context(now, out);
         let place = self.body.tpdo_place(tpdo);
         if self.body.basic.state.has_pdos()
             && let Some(tpdo) = place.and_then(|place| self.body.tpdos.get_mut(usize::from(place)))
@@ -94,8 +96,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
-        let context = &mut self.services.context(now, out);
-        self.self_start(context);
+        let context = &mut self.services.process_context(now, out);
+        self.body.self_start(context);
         if self.body.basic.state.has_pdos() {
             self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
             let events_due = self.body.send_events(context);
@@ -165,6 +167,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         });
         due = due.min(self.send_events(context));
         self.scanner.poll(&self.basic.image, context);
-        self.basic.process_due = due.min(self.scanner.due()).min(self.sync.due());
+        let due = due.min(self.scanner.due()).min(self.sync.due());
+        // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
+        debug_assert!(due > context.now, "process data are still due after a poll");
+        self.basic.process_due = due.max(context.now + Duration(1));
     }
 }

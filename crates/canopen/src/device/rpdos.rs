@@ -4,7 +4,6 @@ use super::body::Body;
 use super::full::Full;
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, little_endian};
-use crate::emcy::Fault;
 use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
@@ -25,10 +24,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.take_rpdo(place, frame, now);
             }
         }
-        // A frame that has no RPDO of its own goes to the RPDO for all nodes.
+        // A frame that has no RPDO of its own goes to the RPDO for all nodes, if it can be a multiplexed PDO.
         if let Some((id, place)) = self.all_nodes
             && !is_own
             && id.is_of_same_service(frame.id())
+            && self.is_mpdo(frame)
         {
             self.take_rpdo(place.into(), frame, now);
         }
@@ -54,12 +54,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Writes the data of an RPDO to the image, and notifies the application.
     pub(super) fn store_rpdo(&mut self, place: usize, data: [u8; 8]) {
         let Some(rpdo) = self.rpdos.get(place) else { return };
-        let index = rpdo.index;
+        let (index, number) = (rpdo.index, rpdo.number());
         match rpdo.layout() {
             Some(layout) if !layout.is_checked() => layout.scatter(data, &mut self.basic.image),
             _ => self.store_checked(index, data),
         }
-        self.basic.application.received((index & 0x1FF) + 1, &mut self.basic.image);
+        self.basic.application.received(number, &mut self.basic.image);
     }
 
     /// Writes the data of an RPDO whose objects have limits or rules. Each value is checked as in an SDO download; a
@@ -74,25 +74,28 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             let size = usize::from(mapped.bits / 8);
             let Some((bytes, behind)) = rest.split_at_checked(size) else { return };
             if let Ok(entry) = entry {
-                self.store_process_value(&entry, bytes);
+                let _ = self.store_process_value(&entry, bytes);
             }
             rest = behind;
         }
     }
 
-    /// Writes a value from a PDO, if the object accepts it.
-    pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) {
+    /// Writes a value from a PDO, if the object accepts it. Returns whether it does.
+    pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) -> bool {
+        let Ok(job) = self.check_store_at_once(entry) else { return false };
         let is_allowed = entry.check_value(little_endian(bytes)).is_ok()
             && (entry.rule() != Rule::Application
                 || self.basic.application.write(entry, bytes, &mut self.basic.image).is_ok());
         if !is_allowed {
-            return;
+            return false;
         }
         entry.field.set(&mut self.basic.image, bytes);
         if entry.rule() == Rule::Application || entry.is_parameter() {
             self.basic.pending.parameters_changed();
             self.basic.services_due = STALE;
         }
+        self.begin_checked(job);
+        true
     }
 
     #[inline(never)]
@@ -110,13 +113,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if !rpdo.set_fault(kind, active) {
             return;
         }
-        let number = u16::try_from(place).unwrap_or(u16::MAX);
-        let fault = match kind {
-            RpdoFault::TooShort => Fault::RpdoTooShort(number),
-            RpdoFault::TooLong => Fault::RpdoTooLong(number),
-            RpdoFault::Deadline => Fault::RpdoDeadline(number),
-        };
-        if active { self.raise(fault, now) } else { self.clear(fault, now) }
+        let fault = rpdo.fault(kind);
+        self.set_fault(fault, active, now);
     }
 
     /// Detects missing RPDOs. Returns the next deadline.
@@ -136,7 +134,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Clears the faults of a PDO that is reconfigured.
     pub(super) fn forget_rpdo_faults(&mut self, place: u16, now: Instant) {
-        for kind in [RpdoFault::TooShort, RpdoFault::TooLong, RpdoFault::Deadline] {
+        for kind in RpdoFault::ALL {
             self.set_rpdo_fault(place.into(), kind, false, now);
         }
     }

@@ -5,6 +5,7 @@ use super::lss::LssSlave;
 use super::{Application as _, Next, Node, STALE};
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
+use crate::pdo::Budget;
 use crate::sdo::{Abort, Server};
 use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
@@ -26,6 +27,8 @@ pub(super) struct Services {
     /// When to continue a block that found the queue full.
     block_due: Instant,
     lss: LssSlave,
+    /// The share of process data in the bus.
+    budget: Budget,
 }
 
 impl Services {
@@ -36,11 +39,18 @@ impl Services {
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: LssSlave::new(node_id),
+            budget: Budget::new(BitRate::FASTEST.kbit()),
         }
     }
 
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
         self.lss.set_bit_rate(bit_rate);
+        self.set_bus_bit_rate(bit_rate);
+    }
+
+    /// Sets the bit rate at which the bus runs.
+    pub(super) fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.budget.set_bit_rate(bit_rate.kbit());
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.
@@ -51,6 +61,12 @@ impl Services {
         self.lss.node_id()
     }
 
+    /// Whether no client waits for a response, except for that of a job.
+    pub(super) fn is_between_requests(&self) -> bool {
+        let waits = self.reply_due.min(self.block_due).min(self.lss.due());
+        self.server.is_between_requests() && waits == Instant::NEVER
+    }
+
     fn forget_transfer(&mut self) {
         self.server.reset();
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
@@ -59,7 +75,16 @@ impl Services {
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
     pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching() }
+        Context { now, out, is_open: !self.lss.is_switching(), budget: None }
+    }
+
+    /// The same for process data, which have a share of the bus.
+    pub(super) fn process_context<'a, Q: Transmit>(
+        &'a mut self,
+        now: Instant,
+        out: &'a mut Q,
+    ) -> Context<'a, Q> {
+        Context { now, out, is_open: !self.lss.is_switching(), budget: Some(&mut self.budget) }
     }
 }
 
@@ -191,24 +216,37 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.services.lss.poll_switching(now, &mut self.body);
+        if let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.body) {
+            self.services.set_bus_bit_rate(bit_rate);
+        }
         let context = &mut self.services.context(now, out);
         self.services.lss.poll(context);
-        let basic = self.body.basic_mut();
-        if !basic.is_initialising() {
+        if !self.body.basic().is_initialising() {
+            // Nothing precedes the boot-up message. Any other heartbeat follows the EMCY that gives the reason for a new
+            // state.
+            let boots_up = self.body.basic().heartbeat.boots_up();
+            if !boots_up {
+                self.body.poll_errors(context);
+            }
+            let basic = self.body.basic_mut();
             let id = basic.service(ERROR_CONTROL);
             basic.heartbeat.poll(id, basic.state, context);
-            self.body.poll_errors(context);
+            if boots_up {
+                self.body.poll_errors(context);
+            }
             self.silence_services();
         }
         if self.body.basic().state.has_services() {
             self.poll_sdo(context);
         }
         self.body.basic_mut().services_due = self.next_service();
+        debug_assert!(self.body.basic().services_due > now, "what is due does not stay due");
     }
 
     fn poll_sdo(&mut self, context: &mut Context<'_, impl Transmit>) {
-        if context.now >= self.services.reply_due || self.services.server.expire(context.now) {
+        // Both are checked: the deadline of the transfer may have passed while a reply waited for room.
+        let is_expired = self.services.server.expire(context.now);
+        if is_expired || context.now >= self.services.reply_due {
             self.respond(context);
         }
         if B::Application::BLOCK_UPLOAD && context.now >= self.services.block_due {

@@ -27,7 +27,7 @@ pub(crate) use entry::little_endian;
 pub use field::Field;
 pub use group::{Group, Groups};
 pub use object::{Access, DefaultValue, Mapping, Object};
-pub use packed::{BufferFull, packed_size};
+pub use packed::{BufferFull, is_packed, packed_size};
 pub use rule::Rule;
 pub use tables::{Dictionary, Entries, Tables};
 pub use types::Type;

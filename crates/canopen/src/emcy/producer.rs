@@ -1,10 +1,10 @@
-//! The EMCY producer: keeps the set of active faults and sends their changes.
+//! The EMCY producer: keeps the set of active faults, sends their changes, and keeps the list of the errors sent.
 
 use super::history::History;
 use super::{Condition, Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::{Context, RETRY};
-use crate::{CobId, Duration, Frame, Instant, Transmit};
+use crate::{CobId, Duration, ErrorClass, Frame, Instant, Transmit};
 use heapless::Deque;
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
@@ -28,9 +28,11 @@ pub(crate) struct Producer {
     waiting: Deque<Message, WAITING>,
     /// 1015h, in 100 us.
     inhibit: u16,
-    /// The end of the inhibit time after the last message.
-    inhibited_until: Instant,
+    /// When the last message was sent.
+    sent_at: Option<Instant>,
     due: Instant,
+    /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_errors`].
+    errors: u8,
 }
 
 impl Producer {
@@ -43,26 +45,38 @@ impl Producer {
             history: History::new(),
             waiting: Deque::new(),
             inhibit: 0,
-            inhibited_until: Instant(0),
+            sent_at: None,
             due: Instant::NEVER,
+            errors: 0,
         }
     }
 
-    /// Takes the COB-ID of 1014h. Bit 31 disables EMCY.
-    pub(crate) fn configure(&mut self, value: u32) {
-        self.id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+    /// Takes the COB-ID of 1014h. Bit 31 disables EMCY. Returns whether this value switches EMCY on.
+    pub(crate) fn configure(&mut self, value: u32) -> bool {
+        let id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+        let was_on = core::mem::replace(&mut self.id, id).is_some();
+        id.is_some() && !was_on
     }
 
-    /// Takes the inhibit time of 1015h, from the next message on.
-    pub(crate) fn set_inhibit(&mut self, inhibit: u16) {
+    /// Takes the inhibit time of 1015h. It applies to a waiting message, too.
+    pub(crate) fn set_inhibit(&mut self, inhibit: u16, now: Instant) {
         self.inhibit = inhibit;
+        if !self.is_idle() {
+            self.due = self.next_due(now);
+        }
+    }
+
+    /// When the next message may be sent.
+    fn next_due(&self, now: Instant) -> Instant {
+        let inhibited = self.sent_at.map(|sent| sent + Duration::from_inhibit(self.inhibit));
+        inhibited.map_or(now, |end| end.max(now))
     }
 
     /// After a reset: clears the history, and reports the faults that are still active again.
     pub(crate) fn restart(&mut self, now: Instant) {
         self.history.clear();
-        self.waiting.clear();
-        self.due = Instant::NEVER;
+        self.forget_waiting();
+        self.errors = 0;
         let active = core::mem::take(&mut self.active);
         for fault in active.singles() {
             self.raise(fault, now);
@@ -73,11 +87,46 @@ impl Producer {
     pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
-            let Condition { code, detail, .. } = fault.condition(self.conditions);
-            self.history.push(code);
-            self.report(code, detail, now);
+            let condition = fault.condition(self.conditions);
+            self.report(condition.code, condition.detail, now);
+            if let Some(class) = condition.class {
+                self.add_error(class);
+            }
         }
         is_new
+    }
+
+    /// Reports an active fault again.
+    pub(crate) fn repeat(&mut self, fault: Fault, now: Instant) {
+        let Condition { code, detail, .. } = fault.condition(self.conditions);
+        self.report(code, detail, now);
+    }
+
+    /// Reports the active faults again, without those of heartbeats and RPDOs.
+    pub(crate) fn repeat_singles(&mut self, now: Instant) {
+        self.active.singles().for_each(|fault| self.repeat(fault, now));
+    }
+
+    /// Object 1029h is to be applied for an error of this class.
+    pub(crate) fn add_error(&mut self, ErrorClass(sub): ErrorClass) {
+        self.errors |= 1_u8.checked_shl(sub.into()).unwrap_or(0);
+    }
+
+    /// The classes of the errors since the last call.
+    pub(crate) fn take_errors(&mut self) -> impl Iterator<Item = ErrorClass> + use<> {
+        let errors = core::mem::take(&mut self.errors);
+        (0..8).filter(move |sub| errors & 1 << sub != 0).map(ErrorClass)
+    }
+
+    /// Discards the waiting messages.
+    pub(crate) fn forget_waiting(&mut self) {
+        self.waiting.clear();
+        self.due = Instant::NEVER;
+    }
+
+    /// Whether no message waits.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.waiting.is_empty()
     }
 
     /// Clears a fault. Returns whether the fault was active. After the last active fault, code 0000h is sent.
@@ -98,7 +147,7 @@ impl Producer {
         {
             *newest = message;
         }
-        self.due = self.due.min(self.inhibited_until.max(now));
+        self.due = self.due.min(self.next_due(now));
     }
 
     /// The error register, object 1001h.
@@ -125,20 +174,19 @@ impl Producer {
         if context.now < self.due {
             return;
         }
-        let Some(cob_id) = self.id else {
-            self.waiting.clear();
-            self.due = Instant::NEVER;
-            return;
-        };
+        let Some(cob_id) = self.id else { return self.forget_waiting() };
         while let Some(message) = self.waiting.front() {
             if !context.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
                 self.due = context.now + RETRY;
                 return;
             }
+            if message.code != 0 {
+                self.history.push(message.code);
+            }
             let _ = self.waiting.pop_front();
-            if self.inhibit != 0 {
-                self.inhibited_until = context.now + Duration::from_inhibit(self.inhibit);
-                self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
+            self.sent_at = Some(context.now);
+            if self.inhibit != 0 && !self.waiting.is_empty() {
+                self.due = self.next_due(context.now);
                 return;
             }
         }
@@ -146,11 +194,11 @@ impl Producer {
     }
 }
 
-/// Checks a new value of 1014h: the CAN-ID must be configurable, and can change only while EMCY is disabled (bit 31).
+/// Checks a new value of 1014h: the CAN-ID can change only while EMCY is disabled (bit 31). EMCY that is enabled needs a
+/// configurable CAN-ID.
 pub(crate) fn check_cob_id(old: u32, new: u32) -> Result<(), Abort> {
     let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
     let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
-    let stays = !old.bit31 && !new.bit31;
-    let moves = stays && old.id != new.id;
-    if moves || new.id.is_restricted() { Err(Abort::InvalidValue) } else { Ok(()) }
+    let moves = !old.bit31 && old.id != new.id;
+    if !new.bit31 && (moves || new.id.is_restricted()) { Err(Abort::InvalidValue) } else { Ok(()) }
 }

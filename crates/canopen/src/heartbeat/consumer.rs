@@ -83,6 +83,11 @@ impl<const W: usize> Consumer<W> {
         None
     }
 
+    /// The entries whose heartbeat is lost, from 0.
+    pub(crate) fn lost(&self) -> impl Iterator<Item = u8> {
+        (0..).zip(&self.entries).filter(|(_, entry)| entry.is_lost).map(|(number, _)| number)
+    }
+
     /// The next instant at which a heartbeat is missing.
     pub(crate) fn due(&self) -> Instant {
         self.entries.iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))

@@ -31,9 +31,23 @@ impl Producer {
         }
     }
 
+    /// Whether the boot-up message has not been sent yet.
+    pub(crate) fn boots_up(&self) -> bool {
+        self.boot_up
+    }
+
     /// When the next message is due.
     pub(crate) fn due(&self) -> Instant {
         self.due
+    }
+
+    /// The latest instant at which a consumer with a time of 1.5 periods still expects the next heartbeat.
+    pub(crate) fn latest(&self) -> Instant {
+        match self.due {
+            _ if self.boot_up => Instant(0),
+            Instant::NEVER => Instant::NEVER,
+            due => due + Duration::from_millis(u64::from(self.period) / 2),
+        }
     }
 
     /// Sends the boot-up message or the heartbeat, if it is due.

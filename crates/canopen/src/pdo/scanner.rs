@@ -69,6 +69,8 @@ pub(crate) struct Scanner<const M: usize> {
     /// Whether any object waits to be sent.
     is_pending: bool,
     event_due: Instant,
+    /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
+    sent: Option<Instant>,
     inhibited_until: Instant,
 }
 
@@ -79,6 +81,7 @@ impl<const M: usize> Scanner<M> {
             watched: Vec::new(),
             is_pending: false,
             event_due: Instant::NEVER,
+            sent: None,
             inhibited_until: Instant(0),
         }
     }
@@ -113,6 +116,14 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
+    /// Sends the selected objects that have not been sent: those that were selected in Operational.
+    pub(crate) fn send_new(&mut self) {
+        for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
+            watched.is_pending |= watched.sent.is_none();
+            self.is_pending |= watched.is_pending;
+        }
+    }
+
     /// Deselects the objects that a TPDO maps.
     pub(crate) fn deselect(&mut self, layout: &Layout) {
         for watched in &mut self.watched {
@@ -136,10 +147,24 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
-    /// Discards everything that waits, on leaving Operational.
+    /// Discards everything that waits, on leaving Operational. The inhibit time continues.
     pub(crate) fn stop(&mut self) {
         self.watched.iter_mut().for_each(|watched| watched.is_pending = false);
-        (self.is_pending, self.event_due, self.inhibited_until) = (false, Instant::NEVER, Instant(0));
+        (self.is_pending, self.event_due) = (false, Instant::NEVER);
+        self.inhibited_until = self.inhibit_end();
+    }
+
+    /// Ends the inhibit time, at a reset.
+    pub(crate) fn reset(&mut self) {
+        self.sent = None;
+        self.stop();
+    }
+
+    fn inhibit_end(&self) -> Instant {
+        match (self.sent, self.settings) {
+            (Some(sent), Some(settings)) => sent + Duration::from_inhibit(settings.inhibit),
+            _ => Instant(0),
+        }
     }
 
     /// When the next frame or the event timer is due.
@@ -166,7 +191,7 @@ impl<const M: usize> Scanner<M> {
         if elapsed {
             self.send_all();
         }
-        if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
+        if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {
             self.event_due = context.now + Duration::from_millis(settings.event.into());
         }
         if !self.is_pending {
@@ -179,11 +204,12 @@ impl<const M: usize> Scanner<M> {
             let data = watched.value(image);
             // All these frames have the same identifier but different objects: no frame may replace another in the
             // queue.
-            if !context.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+            if !context.send_multiplexed(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
                 self.inhibited_until = context.now + RETRY;
                 return;
             }
             (watched.sent, watched.is_pending) = (Some(data), false);
+            self.sent = Some(context.now);
             if settings.inhibit != 0 {
                 self.inhibited_until = context.now + Duration::from_inhibit(settings.inhibit);
             }

@@ -43,6 +43,14 @@ impl Settings {
         layout: Layout::EMPTY,
     };
 
+    /// The end of the inhibit time after a transmission. The types 254 and 255 have an inhibit time (CiA 301, 7.5.2.35).
+    fn inhibit_end(&self, sent: Option<Instant>) -> Instant {
+        match sent {
+            Some(sent) if self.transmission.is_event_driven() => sent + Duration::from_inhibit(self.inhibit),
+            _ => Instant(0),
+        }
+    }
+
     fn sends_on_change(&self) -> bool {
         self.transmission == Transmission::Event && self.event == 0 && self.events_of.is_none()
     }
@@ -66,6 +74,8 @@ pub(crate) struct Tpdo {
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
     event_due: Instant,
+    /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
+    sent: Option<Instant>,
     /// The end of the inhibit time; earlier, a transmission waits.
     inhibited_until: Instant,
     /// When to ask the application for events. Used only for a TPDO that sends events.
@@ -89,10 +99,6 @@ impl Events {
     const BEGIN: Events = Events { may_wait: true, is_open: true, is_silent: false };
 }
 
-/// Free places that events leave in the transmit queue. The bus may be busy for minutes, but events can wait in the
-/// application.
-const ROOM_FOR_OTHERS: usize = 8;
-
 impl Tpdo {
     pub(crate) const fn new() -> Tpdo {
         Tpdo {
@@ -104,6 +110,7 @@ impl Tpdo {
             is_counting: false,
             data: None,
             event_due: Instant::NEVER,
+            sent: None,
             inhibited_until: Instant(0),
             events: Events::NONE,
         }
@@ -141,16 +148,17 @@ impl Tpdo {
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
     pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
+        let number = self.events_of()?;
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
             && context.now >= self.inhibited_until;
-        if is_asked_now && context.room() <= ROOM_FOR_OTHERS {
+        if is_asked_now && !context.has_room_for_event() {
             (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
             return None;
         }
-        settings.events_of.filter(|_| is_asked_now)
+        is_asked_now.then_some(number)
     }
 
     /// Handles the answer of the application. If `is_event`, the event is in the image.
@@ -176,11 +184,17 @@ impl Tpdo {
         if is_asked { self.inhibited_until } else { Instant::NEVER }
     }
 
-    /// Discards a waiting transmission and all deadlines, on leaving Operational.
+    /// Discards a waiting transmission and the event timer, on leaving Operational. The inhibit time continues.
     pub(crate) fn stop(&mut self) {
         (self.pending, self.syncs, self.is_counting, self.data) = (false, 0, false, None);
-        (self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));
+        (self.event_due, self.inhibited_until) = (Instant::NEVER, self.settings.inhibit_end(self.sent));
         self.events = Events::NONE;
+    }
+
+    /// Ends the inhibit time, at a reset.
+    pub(crate) fn reset(&mut self) {
+        self.sent = None;
+        self.stop();
     }
 
     /// When the next transmission or the event timer is due.
@@ -221,7 +235,8 @@ impl Tpdo {
         is_turn
     }
 
-    /// Answers a remote frame. TPDOs of the synchronous types 0 to 240 are sent by SYNC only and do not answer.
+    /// Answers a remote frame; the types 254 and 255 answer when the inhibit time is over. TPDOs of the synchronous types
+    /// 0 to 240 are sent by SYNC only and do not answer.
     pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
@@ -230,12 +245,13 @@ impl Tpdo {
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // In a full queue the sample is dropped: the client repeats its request.
-                context.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                context.send_pdo(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             // Before the first event, there is nothing to send.
             _ if settings.events_of.is_some() && self.data.is_none() => (),
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, context);
+                self.pending = true;
+                self.poll(image, context);
             }
             _ => (),
         }
@@ -296,16 +312,16 @@ impl Tpdo {
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
     fn send(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
-        let Settings { id, layout, transmission, inhibit, .. } = &self.settings;
+        let Settings { id, layout, transmission, .. } = &self.settings;
         let data = layout.gather(image);
         let frame = Frame::data_frame(*id, layout.len(), data);
         let sends_events = self.settings.events_of.is_some();
-        let is_sent = if sends_events { context.send(frame) } else { context.send_state(frame) };
+        let is_sent = if sends_events { context.send_event(frame) } else { context.send_pdo(frame) };
         self.pending = !is_sent;
         if is_sent {
-            self.data = Some(data);
-            if *inhibit != 0 {
-                self.inhibited_until = context.now + Duration::from_inhibit(*inhibit);
+            (self.data, self.sent) = (Some(data), Some(context.now));
+            if self.settings.inhibit != 0 {
+                self.inhibited_until = self.settings.inhibit_end(self.sent);
             }
         } else {
             self.inhibited_until = context.now + RETRY;

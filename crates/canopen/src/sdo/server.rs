@@ -68,6 +68,11 @@ impl Server {
         matches!(self.transfer, Transfer::Idle)
     }
 
+    /// Whether no transfer is under way, or one whose response waits for [`release`](Server::release).
+    pub(crate) fn is_between_requests(&self) -> bool {
+        matches!(self.transfer, Transfer::Idle | Transfer::Deferred)
+    }
+
     /// Whether a block download is under way.
     pub(crate) fn takes_block(&self) -> bool {
         matches!(self.transfer, Transfer::BlockDownload(_))

@@ -21,5 +21,6 @@ mod sdo;
 mod service_device;
 mod states;
 mod store;
+mod store_at_once;
 mod sync;
 mod tpdo;

@@ -16,6 +16,24 @@ impl Application for Nothing {}
 #[derive(Default)]
 pub(crate) struct Sent(pub(crate) Vec<Frame>);
 
+/// All frames sent, by a queue that has room for this number of frames.
+pub(crate) struct Short {
+    pub(crate) sent: Vec<Frame>,
+    pub(crate) room: usize,
+}
+
+impl Transmit for Short {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.room = self.room.checked_sub(1).ok_or(QueueFull)?;
+        self.sent.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        self.room
+    }
+}
+
 impl Transmit for Sent {
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.0.push(frame);

@@ -1,6 +1,7 @@
 //! PDOs of dictionaries made for these tests.
 
 mod bench;
+mod deadlines;
 #[allow(dead_code)] // These tests only write.
 #[path = "../exchange/mod.rs"]
 mod exchange;

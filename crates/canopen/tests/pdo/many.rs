@@ -104,7 +104,7 @@ fn the_last_rpdo_has_faults_of_its_own() {
     for data in [&[1][..], &[1, 2]] {
         let _ = node.on_frame(&Frame::new(RPDO + 511, data).unwrap(), NOW, &mut sent);
     }
-    let short = Fault::RpdoTooShort(511);
+    let short = Fault::RpdoTooShort(512);
     assert_eq!(node.application().faults, [(short, true), (short, false)]);
 }
 

@@ -4,9 +4,11 @@ use std::collections::VecDeque;
 
 use canopen::dictionary::Object;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use node::{BitRate, Measurement, Personality, Protocol, Setup, State, StoreJob};
+use node::{
+    BitRate, EraseBudget, Measurement, ParameterMemory, Personality, Protocol, Setup, State, StoreJob,
+};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample, Retained};
-use storage::{DeviceRecord, Pages, Store, View};
+use storage::{DeviceRecord, Pages, View};
 
 use super::flash::{Flash, PAGE};
 use super::step::{Step, raw};
@@ -16,6 +18,8 @@ const PAGES: Pages = Pages::new(0, PAGE);
 const ROOM: usize = 32;
 /// A chip whose temperature sensor is calibrated.
 const CHIP: ChipThermometer = ChipThermometer { offset: 24.6, slope: 444.0 };
+/// The longest erase of a page.
+const ERASE: Duration = Duration::from_millis(500);
 /// Limit of the requests that a call can leave.
 const REQUESTS: usize = 16;
 
@@ -48,7 +52,7 @@ pub(super) struct Board {
     pub(super) protocol: Protocol,
     measurement: Measurement,
     flash: Flash,
-    store: Option<Store<Flash>>,
+    memory: Option<ParameterMemory<Flash>>,
     pub(super) out: Queue,
     pub(super) now: Instant,
     pub(super) due: Instant,
@@ -76,7 +80,7 @@ impl Board {
             protocol: Protocol::new(&unless_stored),
             measurement: Measurement::new(personality, &PowerOn::default()),
             flash: Flash::erased(),
-            store: None,
+            memory: None,
             out: Queue::default(),
             now: Instant(0),
             due: Instant(0),
@@ -95,9 +99,9 @@ impl Board {
     fn power_on(&mut self, retained: Retained) {
         self.out.waiting.clear();
         self.actions.clear();
-        self.store = None;
+        self.memory = None;
         let mut parameters = self.protocol.parameters();
-        while self.store.is_none() {
+        while self.memory.is_none() {
             self.flash.power_up();
             let mut view = View::open(self.flash.clone(), PAGES).expect("there is power");
             let record = view.device().expect("there is power");
@@ -105,8 +109,9 @@ impl Board {
             self.personality = setup.personality;
             self.protocol = Protocol::new(&setup);
             parameters = self.protocol.load(&mut view);
-            self.store = Store::prepare(view).ok();
+            self.memory = ParameterMemory::prepare(view, EraseBudget::new(None)).ok();
         }
+        self.show_memory();
         self.measurement = Measurement::new(
             self.personality,
             &PowerOn { thermometer: CHIP, retained, ..PowerOn::default() },
@@ -266,12 +271,22 @@ impl Board {
 
     fn run_job(&mut self) {
         let mut job = StoreJob::new(Personality::default());
-        let Some(store) = self.store.as_mut().filter(|_| self.protocol.take_job(&mut job)) else { return };
-        let result = job.run(store);
+        let Some(memory) = self.memory.as_mut().filter(|_| self.protocol.take_job(&mut job)) else { return };
+        let result = memory.run(&mut job);
+        if memory.can_make_room(self.now) && self.protocol.can_pause(ERASE, self.now) {
+            let _ = memory.make_room();
+        }
         if self.flash.is_down() {
             return self.power_on(Retained::Nothing);
         }
+        self.show_memory();
         let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
+    }
+
+    fn show_memory(&mut self) {
+        if let Some(memory) = &self.memory {
+            self.protocol.show_memory(memory.state());
+        }
     }
 }
 

@@ -240,7 +240,7 @@ pub(super) fn version_b(length: usize) -> Image {
 /// Code that is not meant to run, in a valid image except for the change.
 pub(super) fn signed(code: Vec<u8>, change: impl FnOnce(&mut Description)) -> Image {
     let mut about = Description {
-        product: product::PRODUCT,
+        board: product::BOARD,
         hardware: product::HARDWARE,
         version: VERSION_B,
         ..Description::default()

@@ -15,7 +15,7 @@ type Kind = (&'static str, Vec<u8>, u8);
 const UNKNOWN_FORMAT: u8 = 2;
 const CRC: u8 = 3;
 const TOO_LONG: u8 = 6;
-const PRODUCT: u8 = 64;
+const BOARD: u8 = 64;
 const HARDWARE: u8 = 65;
 const SIGNATURE: u8 = 67;
 const TRUNCATED: u8 = 68;
@@ -96,7 +96,7 @@ fn headers() -> Vec<Kind> {
         ("a bit of the header's CRC", bytes(flip(HEADER_LEN - 1)), CRC),
         ("reserved bytes in use", header(put(300, 1)), CRC),
         ("no code by the header", header(put(24, 0)), CRC),
-        ("another product", about(|about| about.product += 1), PRODUCT),
+        ("another board", about(|about| about.board += 1), BOARD),
         ("other hardware", about(|about| about.hardware = 2), HARDWARE),
     ]
 }

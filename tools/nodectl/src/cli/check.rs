@@ -110,10 +110,11 @@ impl Check {
         }
         let count = |effect| checks.iter().filter(|check| check.effect == effect).count();
         let (resets, stores) = (count(Effect::Resets), count(Effect::Stores));
-        eprint!(
+        write!(
+            io::stderr(),
             "{resets} checks restart the device; {stores} also save its parameters or bring its defaults back, and save again what it had. \
              Do them? [y/N] "
-        );
+        )?;
         io::stderr().flush()?;
         let mut answer = String::new();
         io::stdin().lock().read_line(&mut answer)?;

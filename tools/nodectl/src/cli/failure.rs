@@ -110,6 +110,12 @@ impl Failure {
         matches!(self, Failure::Sdo(error) if error.is_silence())
     }
 
+    /// Whether the reader of the results has closed its end.
+    #[must_use]
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Failure::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+
     /// The failure as JSON: one schema for all commands.
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
@@ -150,7 +156,7 @@ fn left_words(left_behind: &[String]) -> String {
 fn sdo_code(error: &sdo::Error) -> u8 {
     match error.cause {
         Cause::Transfer(transfer::Error::Abort(_)) => 1,
-        Cause::Transfer(_) => 3,
+        Cause::Transfer(_) | Cause::Busy => 3,
         Cause::Bus(_) => 4,
     }
 }
@@ -163,7 +169,7 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
         update::Error::Flash { .. } | update::Error::Identification { .. } => 5,
-        update::Error::Product { .. } | update::Error::Older { .. } => 6,
+        update::Error::Board { .. } | update::Error::Older { .. } => 6,
     }
 }
 

@@ -21,6 +21,7 @@ mod rules;
 mod scan;
 mod serve;
 mod session;
+mod sheets;
 mod store;
 mod trace;
 mod update;

@@ -16,14 +16,14 @@ pub enum Error {
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The image is for another product. Nothing was changed.
-    #[error("node {}: the image is for product {image:08X}h, the node is product {device:08X}h", .node.get())]
-    Product {
+    /// The image is for another board. Nothing was changed.
+    #[error("node {}: the image is for board {image:08X}h, the node has board {device:08X}h", .node.get())]
+    Board {
         /// The node.
         node: NodeId,
-        /// Product code of the image.
+        /// Board code of the image.
         image: u32,
-        /// Product code of the node, 1018h:2.
+        /// Board code of the node, 2004h:1.
         device: u32,
     },
     /// The node runs a newer version. Nothing was changed.

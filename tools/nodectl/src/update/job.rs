@@ -189,9 +189,10 @@ impl<'a> Job<'a> {
     /// Refuses a wrong image before anything is changed.
     fn check(&self, network: &mut Network, now: &State) -> Result<(), Error> {
         let Some(info) = &self.image.info else { return Ok(()) };
-        let device = self.word(network, at(0x1018, 2))?;
-        if device != info.product {
-            return Err(Error::Product { node: self.node, image: info.product, device });
+        // A node without the object leaves the check to its bootloader.
+        let device = self.program(network).board()?.filter(|device| *device != info.board);
+        if let Some(device) = device {
+            return Err(Error::Board { node: self.node, image: info.board, device });
         }
         let running = now.version.as_deref().and_then(version);
         match &now.version {
@@ -372,11 +373,6 @@ impl<'a> Job<'a> {
             Err(error) if error.is_absent() => Ok(None),
             Err(error) => Err(error.into()),
         }
-    }
-
-    fn word(&self, network: &mut Network, at: Multiplexer) -> Result<u32, Error> {
-        let bytes = Client::new(network, self.node, self.options.sdo).upload(at)?;
-        Ok(bytes.try_into().map_or(0, u32::from_le_bytes))
     }
 
     fn program<'n>(&self, network: &'n mut Network) -> Program<'n> {

@@ -3,8 +3,10 @@
 mod bad_input;
 mod blocks;
 mod check;
+mod cloning;
 mod commands;
 mod configuration;
+mod everyday;
 mod hostile;
 mod loader;
 mod lss;

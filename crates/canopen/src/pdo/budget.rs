@@ -1,0 +1,142 @@
+//! The share of the bus that the process data of this node may take.
+//!
+//! The CAN-IDs of PDOs are more urgent than those of SDO and heartbeat. A node whose PDOs fill the bus would silence its
+//! own heartbeat and its own SDO server, and no master could correct its settings. PDOs therefore take at most three
+//! quarters of the bus, measured over a quarter of a second. A PDO without credit waits, and is sent with its newest
+//! values. The longest waiting PDO has the first claim, so no PDO starves another one.
+
+use crate::transmit::RETRY;
+use crate::{Duration, Instant};
+
+/// The share: `SHARE` / 4 of the bus.
+const SHARE: u64 = 3;
+/// Time over which credit accumulates.
+const WINDOW: Duration = Duration::from_millis(250);
+/// A claim that is not renewed has ended: a waiting PDO tries again each millisecond.
+const CLAIM: Duration = Duration(3 * RETRY.0);
+
+/// Credit for process data, in thousandths of a bit.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    /// The bit rate in kbit/s: bits a millisecond.
+    kbit: u16,
+    credit: u32,
+    refilled: Instant,
+    /// The CAN-ID of the PDO with the first claim, and the end of the claim.
+    claim: Option<(u16, Instant)>,
+}
+
+impl Budget {
+    /// A full budget.
+    pub(crate) const fn new(kbit: u16) -> Budget {
+        Budget { kbit, credit: limit(kbit), refilled: Instant(0), claim: None }
+    }
+
+    /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.
+    pub(crate) fn set_bit_rate(&mut self, kbit: u16) {
+        self.kbit = kbit;
+        self.credit = limit(kbit);
+        self.claim = None;
+    }
+
+    /// Whether the PDO with this CAN-ID and number of bytes may be sent now.
+    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Instant) -> bool {
+        let cost = cost(len);
+        if self.claim.is_none() && self.credit >= cost || self.kbit == 0 {
+            return true;
+        }
+        self.admits_with_refill(id, cost, now)
+    }
+
+    #[inline(never)]
+    fn admits_with_refill(&mut self, id: u16, cost: u32, now: Instant) -> bool {
+        self.refill(now);
+        let other = self.claim.filter(|(other, until)| *other != id && *until > now);
+        if self.credit >= cost && other.is_none() {
+            self.claim = None;
+            return true;
+        }
+        if other.is_none() {
+            self.claim = Some((id, now + CLAIM));
+        }
+        false
+    }
+
+    /// A frame with this number of bytes has been queued.
+    pub(crate) fn spend(&mut self, len: usize) {
+        self.credit = self.credit.saturating_sub(cost(len));
+    }
+
+    fn refill(&mut self, now: Instant) {
+        let elapsed = now.0.saturating_sub(self.refilled.0).min(WINDOW.0);
+        let earned = elapsed * u64::from(self.kbit) * SHARE / 4;
+        let earned = u32::try_from(earned).unwrap_or(u32::MAX);
+        (self.credit, self.refilled) = (self.credit.saturating_add(earned).min(limit(self.kbit)), now);
+    }
+}
+
+/// The most credit that accumulates.
+const fn limit(kbit: u16) -> u32 {
+    #[allow(clippy::cast_possible_truncation, reason = "below 2^32 for every u16")]
+    let limit = (WINDOW.0 / 1000 * kbit as u64 * SHARE / 4) as u32;
+    limit.saturating_mul(1000)
+}
+
+/// The longest frame with this number of bytes, with stuff bits and the space after it: 55 bits and ten for each byte.
+const fn cost(len: usize) -> u32 {
+    #[allow(clippy::cast_possible_truncation, reason = "a frame has at most eight bytes")]
+    let bits = 55 + 10 * len as u32;
+    bits * 1000
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
+
+    /// Eight PDOs of eight bytes that are due at every millisecond: the frames of each in ten seconds.
+    fn frames_of_eight(kbit: u16) -> [u32; 8] {
+        let mut budget = Budget::new(kbit);
+        let mut frames = [0; 8];
+        for ms in 0..10_000 {
+            for (id, count) in (0x181..).zip(&mut frames) {
+                if budget.admits(id, 8, Instant(ms * 1000)) {
+                    budget.spend(8);
+                    *count += 1;
+                }
+            }
+        }
+        frames
+    }
+
+    #[test]
+    fn pdos_take_at_most_three_quarters_of_the_bus_at_every_bit_rate() {
+        for kbit in RATES {
+            let bits = frames_of_eight(kbit).iter().sum::<u32>() * 135;
+            let seconds = f64::from(bits) / f64::from(kbit) / 1000.0;
+            let may = 0.75 * (10.0 + 0.25);
+            assert!(seconds <= may, "{kbit} kbit/s: {seconds} s of 10 s");
+            assert!(seconds > 0.72 * 10.0 || kbit == 1000, "{kbit} kbit/s: {seconds} s of 10 s");
+        }
+    }
+
+    #[test]
+    fn no_pdo_starves_another_one_at_any_bit_rate() {
+        for kbit in RATES {
+            let frames = frames_of_eight(kbit);
+            let (least, most) = (frames.iter().min().unwrap(), frames.iter().max().unwrap());
+            assert!(least * 2 >= *most, "{kbit} kbit/s: {frames:?}");
+        }
+    }
+
+    #[test]
+    fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
+        let mut budget = Budget::new(10);
+        while budget.admits(0x181, 8, Instant(0)) {
+            budget.spend(8);
+        }
+        assert!(!budget.admits(0x281, 8, Instant(2_000)), "181h has the claim");
+        assert!(budget.admits(0x281, 8, Instant(40_000)), "the claim of 181h has ended");
+    }
+}
