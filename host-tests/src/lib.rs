@@ -8,6 +8,7 @@ pub mod calls;
 pub mod domain;
 pub mod lift417;
 pub mod lss;
+pub mod matrix;
 pub mod network;
 pub mod sdo;
 pub mod station;

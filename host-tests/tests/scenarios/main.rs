@@ -11,3 +11,4 @@ mod inhibit;
 mod starving;
 mod states;
 mod storing;
+mod transfers;
