@@ -309,7 +309,7 @@ impl Bench {
 
     /// Carries out a store job.
     pub fn end_store(&mut self, mut job: StoreJob) {
-        let result = job.run(&mut self.store);
+        let result = self.store.run(&mut job);
         let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
         self.observe();
     }
