@@ -116,7 +116,7 @@ impl Session {
     pub(crate) fn step(&mut self, out: &mut Outbox) -> Then {
         let now = Clock::now();
         self.watch_bus(now);
-        let next = self.advance(now);
+        let next = self.advance();
         let next_call = self.device.poll(now, out);
         let due = self.fulfil(next_call, out);
         match (self.reset, next) {
@@ -128,7 +128,7 @@ impl Session {
     }
 
     /// Does one step of the update. A valid image is copied at once: 1F57h is busy until the image can be started.
-    fn advance(&mut self, now: Instant) -> Next {
+    fn advance(&mut self) -> Next {
         let program = self.device.application_mut();
         let mut next = program.updater().poll();
         if program.updater().phase() == Phase::Committed {

@@ -177,13 +177,10 @@ fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32
     let header = image::admitted(flash, target, area)?;
     let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
     let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
-    loop {
-        if let Some(header) = check.step(flash, target)? {
-            *seal = if let Proof::Of(word) = proof { word } else { 0 };
-            if !is_proven {
-                *seal = check.seal(target);
-            }
-            return Ok(header);
-        }
+    while !check.step(flash, target)? {}
+    *seal = if let Proof::Of(word) = proof { word } else { 0 };
+    if !is_proven {
+        *seal = check.seal(target);
     }
+    Ok(*check.header())
 }

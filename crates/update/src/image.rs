@@ -101,17 +101,18 @@ impl FullCheck {
         FullCheck { message: None, ..FullCheck::of(header, area) }
     }
 
-    /// Does one step; returns the header once the whole check has passed.
-    pub(crate) fn step<F: Flash>(
-        &mut self,
-        flash: &mut F,
-        target: &Target,
-    ) -> Result<Option<Header>, Refusal> {
+    /// The header of the image.
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Does one step; returns whether the whole check has passed.
+    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<bool, Refusal> {
         let Some(signature) = &mut self.signature else { return self.read(flash, target) };
         match (signature.step(), self.first) {
-            (None, _) => Ok(None),
+            (None, _) => Ok(false),
             (Some(false), _) => Err(Refusal::Signature),
-            (Some(true), Some(_)) => Ok(Some(self.header)),
+            (Some(true), Some(_)) => Ok(true),
             (Some(true), None) => {
                 self.first = Some(signature.seal(self.header.crc()));
                 self.verify(target)
@@ -128,20 +129,20 @@ impl FullCheck {
         seal(signature.seal(first), signature.key(), key)
     }
 
-    fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
+    fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<bool, Refusal> {
         let message = &mut self.message;
         if !self.crc.step(flash, &mut |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
-            return Ok(None);
+            return Ok(false);
         }
-        let Some(message) = message else { return Ok(Some(self.header)) };
+        let Some(message) = message else { return Ok(true) };
         self.hash = message.end();
         self.verify(target)
     }
 
     /// Starts a verification of the signature.
-    fn verify(&mut self, target: &Target) -> Result<Option<Header>, Refusal> {
+    fn verify(&mut self, target: &Target) -> Result<bool, Refusal> {
         let (signature, key) = (self.header.signature(), target.key_of(&self.header));
         self.signature = key.and_then(|key| Verification::new(&self.hash, CONTEXT, signature, key));
-        if self.signature.is_some() { Ok(None) } else { Err(Refusal::Signature) }
+        if self.signature.is_some() { Ok(false) } else { Err(Refusal::Signature) }
     }
 }
