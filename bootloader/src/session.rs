@@ -17,6 +17,7 @@ use crate::dictionary::{DICTIONARY, ROWS};
 use crate::identity::Identity;
 use crate::outbox::Outbox;
 use crate::program::Program;
+use crate::run::after;
 use crate::start::Reason;
 use crate::target::TARGET;
 
@@ -122,8 +123,8 @@ impl Session {
         match (self.reset, next) {
             (Some(latest), _) => Then::Reset(latest),
             (None, Next::Step) => Then::Again,
-            (None, Next::Erasing) => Then::Sleep(due.min(now + ERASE_POLL)),
-            (None, Next::Nothing) => Then::Sleep(due.min(now + PERIOD).min(self.back_off.due())),
+            (None, Next::Erasing) => Then::Sleep(due.min(after(ERASE_POLL))),
+            (None, Next::Nothing) => Then::Sleep(due.min(after(PERIOD)).min(self.back_off.due())),
         }
     }
 
@@ -189,7 +190,7 @@ impl Session {
     }
 
     fn reset_soon(&mut self) {
-        self.reset.get_or_insert(Clock::now() + FAREWELL);
+        self.reset.get_or_insert(after(FAREWELL));
     }
 
     /// Notes node-ID and bit rate for the next start.

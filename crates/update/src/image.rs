@@ -86,19 +86,14 @@ pub(crate) struct FullCheck {
 impl FullCheck {
     /// A check of the staged image.
     pub(crate) fn new<F: Flash>(flash: &mut F, target: &Target) -> Result<FullCheck, Refusal> {
-        Ok(FullCheck::of(candidate(flash, target)?, target.layout.staging()))
+        Ok(FullCheck::of(&candidate(flash, target)?, target.layout.staging(), true))
     }
 
-    /// A check of the image with this header in an area.
-    pub(crate) fn of(header: Header, area: Area) -> FullCheck {
-        let crc = CrcCheck::new(&header, area);
-        let message = Some(Message::of(&header));
-        FullCheck { header, crc, message, hash: [0; HASH_LEN], signature: None, first: None }
-    }
-
-    /// The same check without the signature.
-    pub(crate) fn of_sum(header: Header, area: Area) -> FullCheck {
-        FullCheck { message: None, ..FullCheck::of(header, area) }
+    /// A check of the image with this header in an area, with or without its signature.
+    pub(crate) fn of(header: &Header, area: Area, is_signed: bool) -> FullCheck {
+        let crc = CrcCheck::new(header, area);
+        let message = is_signed.then(|| Message::of(header));
+        FullCheck { header: *header, crc, message, hash: [0; HASH_LEN], signature: None, first: None }
     }
 
     /// The header of the image.

@@ -216,13 +216,13 @@ impl<F: Flash> Updater<F> {
     pub fn revert(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
         let layout = &self.target.layout;
-        if !trial::has_failed(&mut self.flash, layout) {
+        if !Trial::read(&mut self.flash, layout).has_failed() {
             return Err(Refusal::Unspecified);
         }
         trial::fail(&mut self.flash, layout)?;
         let kept = layout.kept();
         let header = image::admitted(&mut self.flash, &self.target, kept);
-        self.check(Plan::Revert, header.map(|header| FullCheck::of(header, kept)))
+        self.check(Plan::Revert, header.map(|header| FullCheck::of(&header, kept, true)))
     }
 
     /// Starts a check.
@@ -356,7 +356,7 @@ impl<F: Flash> Updater<F> {
         if self.has_kept() {
             self.kept().close(&mut self.flash)?;
         } else if let Ok(header) = image::header(&mut self.flash, application) {
-            self.state = State::Checking(FullCheck::of_sum(header, application), Plan::Keep);
+            self.state = State::Checking(FullCheck::of(&header, application, false), Plan::Keep);
             return Ok(());
         }
         self.replace(Plan::Install, staged);
