@@ -53,7 +53,7 @@ def simulator(tmp_path_factory):
     # The node must have booted once before a reset, so that this boot-up is not taken for the one of the reset.
     Master(simulator).ready().close()
     yield simulator
-    simulator.process.kill()
+    simulator.end()
 
 
 @pytest.fixture

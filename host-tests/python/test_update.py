@@ -28,7 +28,7 @@ DATA, CONTROL, IDENTIFICATION, STATUS = 0x1F50, 0x1F51, 0x1F56, 0x1F57
 def simulator():
     simulator = Simulator("--bitrate", "1000", speed="real")
     yield simulator
-    simulator.process.kill()
+    simulator.end()
 
 
 def image(path: Path, version: str) -> Path:

@@ -47,6 +47,7 @@ pub struct Machine<P: Peripherals + 'static> {
     model: Model,
     power_up: PowerUp,
     powered: bool,
+    power_ons: u64,
     sleeping: bool,
     locked: Option<u32>,
     stall: Time,
@@ -78,6 +79,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             model,
             power_up: PowerUp::new(0),
             powered: false,
+            power_ons: 0,
             sleeping: false,
             locked: None,
             stall: Time::ZERO,
@@ -177,7 +179,13 @@ impl<P: Peripherals + 'static> Machine<P> {
         core.now = core.now.max(at);
         core.chip.reset(true, core.now);
         self.powered = true;
+        self.power_ons += 1;
         self.restart();
+    }
+
+    /// How often the supply was switched on.
+    pub fn power_ons(&self) -> u64 {
+        self.power_ons
     }
 
     /// Switches the supply off: RAM loses its content, flash keeps it.

@@ -32,6 +32,7 @@ pub mod object;
 mod other_clients;
 mod pdo_parameters;
 pub mod quantity;
+pub mod rules;
 pub mod scan;
 pub mod sdo;
 pub mod text;

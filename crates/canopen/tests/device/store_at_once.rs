@@ -107,7 +107,8 @@ fn a_preset_is_refused_without_effect_while_another_job_runs() {
     let mut bench = booted();
     request(&mut bench, [0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e']);
     job(&mut bench);
-    (bench.told(), bench.take_parameters());
+    bench.told();
+    bench.take_parameters();
     assert_eq!(bench.write(PRESET, 0, &[7]), Err(DEVICE_STATE));
     assert_eq!((value(&bench), bench.told(), bench.take_parameters()), (0, vec![], false));
 }

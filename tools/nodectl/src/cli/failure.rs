@@ -25,7 +25,8 @@ Exit codes:
   6  the program is not for this node; nothing was changed
   7  a file cannot be read or written
   8  two configurations differ (diff)
-  9  the device does not conform (check)";
+  9  the device does not conform (check)
+ 10  a rule of the bus is broken (rules)";
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -76,6 +77,9 @@ pub enum Failure {
         /// The values that the device has not taken back.
         left_behind: Vec<String>,
     },
+    /// Rules of the bus are broken; each breach has been printed already.
+    #[error("{0} breaches of the rules of the bus")]
+    RulesBroken(usize),
     /// A node has other values than the values that were written.
     #[error("still different after it was written: {0}")]
     NotApplied(String),
@@ -132,6 +136,7 @@ impl Failure {
             Failure::Usage(_) => 2,
             Failure::Different(_) => 8,
             Failure::NotConforming { .. } => 9,
+            Failure::RulesBroken(_) => 10,
             Failure::NotApplied(_) => 1,
             Failure::Sdo(error) => sdo_code(error),
             Failure::Lss(lss::Error::Service(Service::Refused(..))) => 1,

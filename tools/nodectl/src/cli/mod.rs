@@ -17,6 +17,7 @@ mod paper;
 mod read;
 mod record;
 mod replacement;
+mod rules;
 mod scan;
 mod serve;
 mod session;
@@ -64,6 +65,7 @@ enum Command {
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),
+    Rules(rules::Rules),
     Save(store::Save),
     Restore(store::Restore),
     Nmt(nmt::Nmt),
@@ -100,6 +102,7 @@ impl Cli {
         match &self.command {
             Command::Diff(diff) => diff.needs_a_bus(),
             Command::Trace(trace) => trace.needs_a_bus(),
+            Command::Rules(rules) => rules.needs_a_bus(),
             Command::Check(check) => check.needs_a_bus(),
             Command::Completions(_) | Command::Man(_) => false,
             _ => true,
@@ -125,6 +128,7 @@ impl Cli {
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
             Command::Trace(trace) => trace.run(session),
+            Command::Rules(rules) => rules.run(session),
             Command::Save(save) => save.run(session),
             Command::Restore(restore) => restore.run(session),
             Command::Nmt(nmt) => nmt.run(session),

@@ -13,6 +13,7 @@ mod lss;
 mod meanings;
 mod pressure;
 mod process;
+mod rules;
 mod safety;
 mod trace;
 mod transfers;
