@@ -3,11 +3,11 @@
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 use embedded_storage::nor_flash::NorFlash;
+use monitor::{Incident, Sender};
 use node::{
     BitRate, BusEvent, EraseBudget, Fault, Identity, Measurement, ParameterMemory, Personality, Protocol,
     Setup, StoreJob,
 };
-use monitor::{Incident, Sender};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
 use storage::{DeviceRecord, Memory, Pages, View};

@@ -55,13 +55,7 @@ pub(crate) fn write(bus: &mut Bus, node: u8, index: u16, sub: u8, bytes: &[u8]) 
 }
 
 /// A download with any result.
-pub(crate) fn try_write(
-    bus: &mut Bus,
-    node: u8,
-    index: u16,
-    sub: u8,
-    bytes: &[u8],
-) -> Result<(), Failure> {
+pub(crate) fn try_write(bus: &mut Bus, node: u8, index: u16, sub: u8, bytes: &[u8]) -> Result<(), Failure> {
     Client::new(&mut bus.server(node)).write(Multiplexer { index, sub }, bytes)
 }
 
