@@ -309,8 +309,10 @@ impl Bench {
 
     /// Carries out a store job.
     pub fn end_store(&mut self, mut job: StoreJob) {
-        let result = job.run(&mut self.store);
-        let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
+        let result = self.store.run(&mut job);
+        keep_room(&mut self.protocol, &mut self.store, self.now);
+        let next = self.protocol.finish(&job, result, self.now, &mut self.out);
+        self.keep(next);
         self.observe();
     }
 
