@@ -161,7 +161,7 @@ fn parameters_of_an_older_firmware_keep_switched_off_tpdos_off() {
         let application = [0x05, 0x23, 0, 1, 1, chosen];
         let set = |group, value| Change::Set { group, version: 0x0301, value };
         let sets = [set(GroupNumber::Two, &communication[..]), set(GroupNumber::Three, &application)];
-        bench.store.save(&sets).unwrap();
+        bench.store.store().save(&sets).unwrap();
         let mut bench = bench.power_cycled();
         assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
         assert_eq!(valid(&mut bench)[..2], expected, "2305h = {chosen}");
