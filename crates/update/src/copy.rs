@@ -49,7 +49,7 @@ impl Copy {
             let Range { start, end } = self.rest;
             self.copy(flash, start, end.saturating_sub(start))?;
             self.rest.start = end.min(start.saturating_add(CHUNK_LEN));
-        } else if self.crc.step(flash, &mut |_| ()).map_err(|_| Refusal::Write)? {
+        } else if self.crc.step(flash, &mut None).map_err(|_| Refusal::Write)? {
             const { assert!(HEADER_LEN == 2 * CHUNK, "two chunks") };
             self.copy(flash, self.to, CHUNK_LEN)?;
             self.copy(flash, self.to.saturating_add(CHUNK_LEN), CHUNK_LEN)?;

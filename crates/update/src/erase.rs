@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use crate::area::Area;
-use crate::flash::{Flash, all_are, read_step};
+use crate::flash::{CHUNK, Flash, PIECES, all_are, read_piece};
 use crate::refusal::Refusal;
 
 /// An erase in progress.
@@ -42,10 +42,11 @@ impl Erase {
     }
 
     fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
-        let mut erased = true;
-        self.rest.start = read_step(flash, self.rest.clone(), &mut |bytes| {
-            erased &= all_are(bytes, 0xFF);
-        })?;
-        if erased { Ok(self.rest.is_empty()) } else { Err(Refusal::NotCleared) }
+        for _ in 0..PIECES {
+            if !all_are(read_piece(flash, &mut self.rest, &mut [0; CHUNK])?, 0xFF) {
+                return Err(Refusal::NotCleared);
+            }
+        }
+        Ok(self.rest.is_empty())
     }
 }

@@ -5,7 +5,7 @@ use core::ops::Range;
 use checksum::Digest;
 
 use crate::area::Area;
-use crate::flash::{Flash, read_step};
+use crate::flash::{CHUNK, Flash, PIECES, read_piece};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::refusal::Refusal;
 use crate::seal::seal;
@@ -52,16 +52,21 @@ impl CrcCheck {
         CrcCheck { expected: header.code_crc(), rest: code(header, area), digest: checksum::begin() }
     }
 
-    /// Does one step; returns whether the check is complete. The CRC is judged only at the end.
+    /// Does one step; returns whether the check is complete. The CRC is judged only at the end. The bytes are also added
+    /// to the message.
     pub(crate) fn step<F: Flash>(
         &mut self,
         flash: &mut F,
-        also: &mut dyn FnMut(&[u8]),
+        message: &mut Option<Message>,
     ) -> Result<bool, Refusal> {
-        self.rest.start = read_step(flash, self.rest.clone(), &mut |bytes| {
+        for _ in 0..PIECES {
+            let mut buffer = [0; CHUNK];
+            let bytes = read_piece(flash, &mut self.rest, &mut buffer)?;
             self.digest.update(bytes);
-            also(bytes);
-        })?;
+            if let Some(message) = message {
+                message.add(bytes);
+            }
+        }
         if !self.rest.is_empty() {
             return Ok(false);
         }
@@ -125,11 +130,10 @@ impl FullCheck {
     }
 
     fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<bool, Refusal> {
-        let message = &mut self.message;
-        if !self.crc.step(flash, &mut |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
+        if !self.crc.step(flash, &mut self.message)? {
             return Ok(false);
         }
-        let Some(message) = message else { return Ok(true) };
+        let Some(message) = &mut self.message else { return Ok(true) };
         self.hash = message.end();
         self.verify(target)
     }

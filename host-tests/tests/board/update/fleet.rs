@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use canbus::Time;
 use clap::Parser;
@@ -86,7 +87,9 @@ pub(super) fn try_update(
     mut outage: Option<Outage>,
     more: &[&str],
 ) -> Result<Vec<Value>, String> {
-    let name = format!("{nodes}-{:08X}-{}.img", image.header.code_crc(), std::process::id());
+    // Tests may run at the same time in one process.
+    static FILES: AtomicU32 = AtomicU32::new(0);
+    let name = format!("{}-{}.img", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::write(&file, image.to_bytes()).unwrap();
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
