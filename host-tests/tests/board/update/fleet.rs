@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use canbus::Time;
 use clap::Parser;
 use host_tests::thorough::either;
+use host_tests::watch::expects;
+use monitor::Rule;
 use nodectl::cli::Cli;
 use serde_json::{Value, json};
 use sign::image::Image;
@@ -176,6 +178,7 @@ fn nodectl_confirms_a_program_on_trial_or_rolls_it_back() {
 /// bootloader refuses it.
 #[test]
 fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
+    let _expected = expects([Rule::SdoProtocol]);
     const BOARD: u8 = 64;
     for (personality, kbit) in PERSONALITIES.into_iter().zip([125, 250, 500, 1000]) {
         let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
@@ -199,6 +202,7 @@ fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
 /// two.
 #[test]
 fn a_node_of_several_is_switched_off_halfway_and_gone_on_with() {
+    let _expected = expects([Rule::HeartbeatLate]);
     let (nodes, off) = either((2, 1), (4, 2));
     let world = boards(nodes);
     let (a, b) = (version_a(), version_b(0));
