@@ -287,6 +287,8 @@ impl<'a> Job<'a> {
 
     /// Why the node has aborted the download, from its status: the abort code has no details.
     fn reason(&self, network: &mut Network, error: sdo::Error) -> Error {
+        // The node also answers the segments that were on their way.
+        let _ = network.pause(POLL);
         let is_refused = |status: &Status| !status.busy && status.code != 0;
         let status = error.abort().and_then(|_| self.program(network).status().ok().flatten());
         match status.filter(is_refused) {
