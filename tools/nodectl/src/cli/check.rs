@@ -125,6 +125,8 @@ impl Check {
     fn try_all(session: &mut Session, options: check::Options) -> Result<check::Run, Failure> {
         let node = session.options.node.one()?;
         let sheet = Check::sheet(session, node)?;
+        // The default SDO server is judged, not the one that other commands prefer.
+        session.network.set_channel(node, None);
         let setup = Setup { node, sheet, timeout: session.options.timeout(), boot: BOOT };
         let bar = bar(options.checks.len());
         let mut subject = Subject::new(&mut session.network, setup);

@@ -91,7 +91,7 @@ fn candidates(row: &Object, id: u8) -> Vec<Vec<u8>> {
         }
         DefaultValue::Text(_) | DefaultValue::None => return Vec::new(),
     };
-    let size = usize::try_from(row.kind.size()).unwrap_or(0);
+    let size = usize::from(row.kind.size());
     let (low, high) = row.limits.unwrap_or((default, default));
     let cob_id = [default ^ 1 << 31, 0x8000_01FA, default ^ 1 << 30];
     let mapped = [0x0005_0008_i64];
@@ -102,7 +102,7 @@ fn candidates(row: &Object, id: u8) -> Vec<Vec<u8>> {
         0x1014 => &[0x4000_0000],
         0x1600..=0x17FF | 0x1A00..=0x1BFF if row.sub > 0 => &mapped,
         0x1016 => &watched,
-        0x6131 => &[0xFD4E_0000_u32 as i64, 0x0005_0000],
+        0x6131 => &[0xFD4E_0000, 0x0005_0000],
         _ => &[],
     };
     let all = first.iter().chain(&plain).filter(|value| row.kind == Type::Integer32 || **value >= 0);

@@ -7,6 +7,7 @@ mod cloning;
 mod commands;
 mod configuration;
 mod everyday;
+mod guests;
 mod hostile;
 mod loader;
 mod lss;
