@@ -11,6 +11,7 @@
 
 mod dictionary;
 mod identity;
+mod memory;
 mod outbox;
 mod program;
 mod run;

@@ -138,7 +138,7 @@ impl Application for Program {
 /// The abort code of a refusal for the SDO client; 1F57h has the details.
 fn abort(refusal: Refusal) -> Abort {
     match refusal {
-        Refusal::NotCleared | Refusal::Unspecified => Abort::DeviceState,
+        Refusal::NotCleared | Refusal::OnTrial | Refusal::Unspecified => Abort::DeviceState,
         _ => Abort::Hardware,
     }
 }

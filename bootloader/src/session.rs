@@ -17,6 +17,7 @@ use crate::dictionary::{DICTIONARY, ROWS};
 use crate::identity::Identity;
 use crate::outbox::Outbox;
 use crate::program::Program;
+use crate::run::after;
 use crate::start::Reason;
 use crate::target::TARGET;
 
@@ -116,19 +117,19 @@ impl Session {
     pub(crate) fn step(&mut self, out: &mut Outbox) -> Then {
         let now = Clock::now();
         self.watch_bus(now);
-        let next = self.advance(now);
+        let next = self.advance();
         let next_call = self.device.poll(now, out);
         let due = self.fulfil(next_call, out);
         match (self.reset, next) {
             (Some(latest), _) => Then::Reset(latest),
             (None, Next::Step) => Then::Again,
-            (None, Next::Erasing) => Then::Sleep(due.min(now + ERASE_POLL)),
-            (None, Next::Nothing) => Then::Sleep(due.min(now + PERIOD).min(self.back_off.due())),
+            (None, Next::Erasing) => Then::Sleep(due.min(after(ERASE_POLL))),
+            (None, Next::Nothing) => Then::Sleep(due.min(after(PERIOD)).min(self.back_off.due())),
         }
     }
 
     /// Does one step of the update. A valid image is copied at once: 1F57h is busy until the image can be started.
-    fn advance(&mut self, now: Instant) -> Next {
+    fn advance(&mut self) -> Next {
         let program = self.device.application_mut();
         let mut next = program.updater().poll();
         if program.updater().phase() == Phase::Committed {
@@ -189,7 +190,7 @@ impl Session {
     }
 
     fn reset_soon(&mut self) {
-        self.reset.get_or_insert(Clock::now() + FAREWELL);
+        self.reset.get_or_insert(after(FAREWELL));
     }
 
     /// Notes node-ID and bit rate for the next start.

@@ -8,6 +8,7 @@ use canopen::{Duration, Instant};
 
 use crate::identity::Identity;
 use crate::outbox::Outbox;
+use crate::run::after;
 use crate::session::Session;
 
 /// Polling interval for frames and errors. An error ends the sleep earlier.
@@ -49,7 +50,7 @@ impl Visit {
 
     /// Latest time of the next call of `go_on`.
     pub(crate) fn due(&self) -> Option<Instant> {
-        (!self.0.is_staying()).then(|| Clock::now() + LOOK)
+        (!self.0.is_staying()).then(|| after(LOOK))
     }
 }
 

@@ -40,7 +40,6 @@ class Simulator:
             assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images --development` builds it"
         command = [os.environ["SIM_COMMAND"], "--bootloader", images / bootloader, "--firmware", images / "firmware"]
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
-<<<<<<< HEAD
         self.log = Path(flags[flags.index("--candump") + 1]) if "--candump" in flags else self._own_log()
         if "--candump" not in flags:
             command += ["--candump", self.log]
@@ -49,9 +48,7 @@ class Simulator:
         self.is_new = "--flash" not in flags
         self.expected: set[str] = set()
         self.is_judged = False
-=======
         command += ["--page-program", os.environ["NODECTL_COMMAND"], *(["--page", page] if page else ["--no-page"])]
->>>>>>> with-monitor
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)
         # The first line lists the served addresses.
@@ -78,7 +75,7 @@ class Simulator:
     def judge(self) -> None:
         """Judges the log by the rules of the bus, once. A rule that was expected must be broken."""
         # A simulator that was killed leaves a log without its end.
-        if self.is_judged or self.process.poll() != 0:
+        if self.is_judged or self.process.poll() != 0 or not self.devices:
             return
         self.is_judged = True
         command = [os.environ["NODECTL_COMMAND"], "--json", "rules", "--file", self.log]
@@ -126,7 +123,7 @@ def devices(flags: tuple) -> dict[int, str]:
     """The node-IDs and personalities of the boards that these flags make."""
     nodes = [flags[place + 1] for place, flag in enumerate(flags) if flag == "--node"] or ["1:pressure"]
     parts = [re.fullmatch(r"(\d+):?(\w*).*", str(node)) for node in nodes]
-    return {int(part[1]): part[2] or "pressure" for part in parts if part}
+    return {int(part[1]): part[2] or "pressure" for part in parts if part and int(part[1]) <= 127}
 
 
 class Master:

@@ -3,11 +3,11 @@
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 use embedded_storage::nor_flash::NorFlash;
+use monitor::{Incident, Sender};
 use node::{
     BitRate, BusEvent, EraseBudget, Fault, Identity, Measurement, ParameterMemory, Personality, Protocol,
     Setup, StoreJob,
 };
-use monitor::{Incident, Sender};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
 use storage::{DeviceRecord, Memory, Pages, View};
@@ -69,7 +69,7 @@ pub type Flash = ParameterMemory<Memory<Vec<u8>>>;
 
 /// The pages of the board (memory.x).
 pub const PAGES: Pages = Pages::new(0, 16 * 1024);
-static ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
+const ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
 /// The longest time for which the erase of a page stops the core.
 pub const ERASE: Duration = Duration::from_millis(500);
 
@@ -310,7 +310,9 @@ impl Bench {
     /// Carries out a store job.
     pub fn end_store(&mut self, mut job: StoreJob) {
         let result = self.store.run(&mut job);
-        let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
+        keep_room(&mut self.protocol, &mut self.store, self.now);
+        let next = self.protocol.finish(&job, result, self.now, &mut self.out);
+        self.keep(next);
         self.observe();
     }
 

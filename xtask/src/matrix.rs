@@ -47,7 +47,9 @@ pub(crate) fn write() -> Result<()> {
 fn table(log: &str) -> String {
     let mut tests: BTreeMap<&str, Ran> = BTreeMap::new();
     for line in log.lines() {
-        let &[test, personality, node, kbit] = line.split('\t').collect::<Vec<_>>().as_slice() else { continue };
+        let &[test, personality, node, kbit] = line.split('\t').collect::<Vec<_>>().as_slice() else {
+            continue;
+        };
         if let (Ok(node), Ok(kbit)) = (node.parse(), kbit.parse()) {
             tests.entry(test).or_default().cases.insert((personality.to_owned(), node, kbit));
         }
@@ -88,7 +90,8 @@ mod tests {
 
     #[test]
     fn a_test_is_a_row_with_its_cases() {
-        let log = "NMT on the board\tlift\t16\t250\nNMT on the board\tencoder\t1\t10\n\nEMCY\tlift\t127\t1000\n";
+        let log =
+            "NMT on the board\tlift\t16\t250\nNMT on the board\tencoder\t1\t10\n\nEMCY\tlift\t127\t1000\n";
         let table = table(log);
         assert!(table.contains("| NMT on the board | 2 | encoder, lift | 1, 16 | 10, 250 |"), "{table}");
         assert!(table.contains("| EMCY | 1 | lift | 127 | 1000 |"), "{table}");

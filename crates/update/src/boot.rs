@@ -100,8 +100,7 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
     if let Trial::Lost(_) = trial {
         return Decision::Revert;
     }
-    let has_failed = trial::has_failed(flash, &target.layout);
-    if commit == Commit::Pending && !has_failed {
+    if commit == Commit::Pending && !trial.has_failed() {
         return Decision::Copy;
     }
     if start.stay {
@@ -118,7 +117,7 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
             Decision::Start(header)
         }
         // A cut at the end of the return may have repeated it.
-        Err(_) if has_failed => Decision::Revert,
+        Err(_) if trial.has_failed() => Decision::Revert,
         // A cut while the copy was marked as done may have left a mark that read as not programmed, so the copy began
         // again. Now the mark reads as programmed, but its image is still in staging.
         Err(_) if commit == Commit::Done => Decision::Copy,
@@ -176,14 +175,11 @@ fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32
     let area = target.layout.application();
     let header = image::admitted(flash, target, area)?;
     let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
-    let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
-    loop {
-        if let Some(header) = check.step(flash, target)? {
-            *seal = if let Proof::Of(word) = proof { word } else { 0 };
-            if !is_proven {
-                *seal = check.seal(target);
-            }
-            return Ok(header);
-        }
+    let mut check = FullCheck::of(&header, area, !is_proven);
+    while !check.step(flash, target)? {}
+    *seal = if let Proof::Of(word) = proof { word } else { 0 };
+    if !is_proven {
+        *seal = check.seal(target);
     }
+    Ok(*check.header())
 }

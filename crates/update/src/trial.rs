@@ -107,6 +107,11 @@ impl Trial {
         if kept(layout).read(flash) == Commit::Pending { fail(flash, layout) } else { Ok(()) }
     }
 
+    /// Whether the trial was lost: the staged image is not copied again, and the kept one is the right program.
+    pub(crate) fn has_failed(self) -> bool {
+        matches!(self, Trial::Lost(_) | Trial::Over(_))
+    }
+
     /// Whether the application is or may be on trial: neither it nor the kept image is confirmed for good.
     pub(crate) fn is_undecided(self) -> bool {
         matches!(self, Trial::Begun | Trial::Open | Trial::Lost(_))
@@ -132,12 +137,6 @@ pub(crate) fn close<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refu
 /// Loses the trial for good, before the application is touched.
 pub(crate) fn fail<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
     mark(flash, place(layout, WITHDRAWN))
-}
-
-/// Whether the trial was lost and there is a kept image: the staged image must not be copied again.
-pub(crate) fn has_failed<F: Flash>(flash: &mut F, layout: &Layout) -> bool {
-    let is_kept = matches!(kept(layout).read(flash), Commit::Pending | Commit::Done);
-    is_kept && reason(flash, layout).is_some()
 }
 
 /// Whether the application has a header, but not that of the image in `area`. Without a header it is damaged, or half

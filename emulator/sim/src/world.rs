@@ -281,7 +281,9 @@ impl World {
         let (records, observer, count) = (&mut self.records, &mut self.observer, self.observed.len());
         self.bus.step(&mut participants, self.now, &mut |event| {
             records.on_event(&event);
-            if let (Some(observer), &Event::Frame { end, frame, transmitter, .. }) = (observer.as_mut(), &event) {
+            if let (Some(observer), &Event::Frame { end, frame, transmitter, .. }) =
+                (observer.as_mut(), &event)
+            {
                 observer.frame(end, &frame, Some(transmitter).filter(|transmitter| *transmitter < count));
             }
         })

@@ -42,7 +42,8 @@ impl Bus for Board {
 
     fn hear(&mut self, id: u16) -> Option<Frame> {
         let port = self.world.port(self.master.port);
-        self.heard.extend(std::iter::from_fn(|| port.receive()).filter_map(|stamped| from_bus(&stamped.frame)));
+        self.heard
+            .extend(std::iter::from_fn(|| port.receive()).filter_map(|stamped| from_bus(&stamped.frame)));
         let place = self.heard.iter().position(|frame| frame.id() == id)?;
         Some(self.heard.remove(place))
     }

@@ -32,7 +32,7 @@ fn moved(mut bench: Bench, node_id: u8) -> Bench {
         bench.receive(&Frame::new(0x7E5, &[command, argument, 0, 0, 0, 0, 0, 0]).unwrap());
     }
     let bench = bench.power_cycled();
-    assert_eq!(bench.id(), node_id.into());
+    assert_eq!(bench.id(), u16::from(node_id));
     bench
 }
 

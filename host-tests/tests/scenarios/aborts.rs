@@ -3,8 +3,9 @@
 use host_tests::bench::{Bench, raw};
 use node::Personality;
 
-/// Writes other values until the store of the node is full and beyond.
+/// Writes other values in Operational, where no page is erased, until the store of the node is full and beyond.
 fn preset_until_full(bench: &mut Bench, index: u16, sub: u8) {
+    bench.nmt(1);
     for value in 1..=600_u32 {
         bench.sample(&raw(0.0, 298.15));
         let _ = bench.write(index, sub, &value.to_le_bytes());

@@ -6,7 +6,7 @@ use host_tests::bench::{raw, setup};
 use host_tests::network::Network;
 use host_tests::sdo::{Client, Failure};
 use host_tests::station::{Sensors, Station};
-use node::{Personality, Setup};
+use node::{BitRate, Personality, Setup};
 use profiles::board::{Inputs, RawEncoder};
 
 /// Sensors in motion: a shaft that turns, a pressure with noise, buttons that are pressed.
@@ -36,14 +36,11 @@ impl Sensors for Motion {
 /// A bus of nodes with sensors in motion.
 pub(crate) type Bus = Network<Station<Motion>>;
 
-/// A node of a personality.
-pub(crate) fn node(personality: Personality, node_id: u8, motion: Motion) -> Station<Motion> {
-    Station::new(&Setup { personality, node_id: NodeId::new(node_id), ..setup() }, motion)
-}
-
 /// A bus with one node that has booted, with node-ID 1.
 pub(crate) fn bus(kbit: u16, personality: Personality, motion: Motion) -> Bus {
-    let mut bus = Network::at(kbit, [node(personality, 1, motion)]);
+    let bit_rate = BitRate::from_kbit(kbit).expect("a bit rate");
+    let setup = Setup { personality, node_id: NodeId::new(1), bit_rate, ..setup() };
+    let mut bus = Network::at(kbit, [Station::new(&setup, motion)]);
     bus.start();
     bus.run(Duration::from_millis(100));
     bus
@@ -55,13 +52,7 @@ pub(crate) fn write(bus: &mut Bus, node: u8, index: u16, sub: u8, bytes: &[u8]) 
 }
 
 /// A download with any result.
-pub(crate) fn try_write(
-    bus: &mut Bus,
-    node: u8,
-    index: u16,
-    sub: u8,
-    bytes: &[u8],
-) -> Result<(), Failure> {
+pub(crate) fn try_write(bus: &mut Bus, node: u8, index: u16, sub: u8, bytes: &[u8]) -> Result<(), Failure> {
     Client::new(&mut bus.server(node)).write(Multiplexer { index, sub }, bytes)
 }
 

@@ -1,7 +1,7 @@
 //! CAN-IDs that belong to another node.
 
-use canopen::lss::Request;
 use canopen::Frame;
+use canopen::lss::Request;
 use host_tests::bench::{Bench, ID, raw};
 use node::Personality;
 

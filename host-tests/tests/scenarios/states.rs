@@ -5,6 +5,7 @@ use node::Personality;
 use profiles::board::RawSample;
 
 const STOPPED: u8 = 2;
+/// Personalities with a pressure channel.
 const PERSONALITIES: [Personality; 2] = [Personality::Pressure, Personality::Combined];
 
 fn run(bench: &mut Bench, milliseconds: u32, reading: &RawSample) {
@@ -32,12 +33,12 @@ fn an_error_that_stops_a_node_is_reported_first() {
 /// P26: stored parameters that cannot be read.
 #[test]
 fn an_error_that_is_found_at_a_start_acts_as_1029h_demands() {
-    for personality in PERSONALITIES {
+    for personality in Personality::ALL {
         let mut bench = Bench::booted_as(personality);
         bench.write(0x1029, 2, &[STOPPED]).expect("1029h:2");
-        bench.write(0x1010, 1, b"save").expect("a save");
-        bench.write(0x6126, 1, &2.0_f32.to_le_bytes()).expect("6126h:1");
-        bench.write(0x1010, 3, b"save").expect("a save");
+        bench.write(0x1010, 2, b"save").expect("a save");
+        bench.write(0x1017, 0, &900_u16.to_le_bytes()).expect("1017h");
+        bench.write(0x1010, 2, b"save").expect("a save");
         let mut bench = bench.power_cycled_with_damage();
         run(&mut bench, 4000, &raw(100_000.0, 298.15));
     }

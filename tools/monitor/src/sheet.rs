@@ -88,9 +88,7 @@ impl Entry {
         };
         let size = usize::from(row.kind.size());
         let initial = match row.default {
-            DefaultValue::Integer(value) if size <= 8 => {
-                Initial::Bytes(value.to_le_bytes()[..size].to_vec())
-            }
+            DefaultValue::Integer(value) if size <= 8 => Initial::Bytes(value.to_le_bytes()[..size].to_vec()),
             DefaultValue::Real(value) => Initial::Bytes(value.to_le_bytes().to_vec()),
             DefaultValue::NodeId(base) => Initial::NodeId(base),
             _ => Initial::Unknown,
@@ -120,9 +118,8 @@ impl Sheet {
 
     /// Whether the object holds a value, of a client or of an RPDO.
     pub(crate) fn holds_value(sheet: Option<&Sheet>, key: Key) -> bool {
-        let is_received = |sheet: &Sheet| {
-            sheet.entries.get(&key).is_some_and(|entry| entry.kind == Kind::Received)
-        };
+        let is_received =
+            |sheet: &Sheet| sheet.entries.get(&key).is_some_and(|entry| entry.kind == Kind::Received);
         Sheet::is_parameter(sheet, key) || sheet.is_some_and(is_received)
     }
 

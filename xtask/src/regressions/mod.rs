@@ -32,7 +32,8 @@ pub(crate) struct Flags {
 
 /// Tries every mend, and prints a line for each.
 pub(crate) fn run(flags: &Flags) -> Result<()> {
-    let is_chosen = |mend: &&Mend| flags.only.is_empty() || flags.only.iter().any(|name| name == mend.finding);
+    let is_chosen =
+        |mend: &&Mend| flags.only.is_empty() || flags.only.iter().any(|name| name == mend.finding);
     let mends: Vec<&Mend> = MENDS.iter().filter(is_chosen).collect();
     ensure!(!mends.is_empty(), "no mend has such a name; --list has them all");
     if flags.list {

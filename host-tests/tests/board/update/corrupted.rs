@@ -4,6 +4,8 @@
 use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
+use host_tests::watch::expects;
+use monitor::Rule;
 use sign::image::Image;
 use update::{Description, HEADER_LEN, SIGNED_LEN};
 
@@ -126,6 +128,7 @@ fn contents() -> Vec<Kind> {
 
 #[test]
 fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
+    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = Bench::running();
     let before = bench.application();
     bench.stop();
@@ -146,6 +149,7 @@ fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
 /// Only the security counter of a confirmed image is in force, so the test takes two updates.
 #[test]
 fn an_image_with_a_lower_counter_is_refused() {
+    let _expected = expects([Rule::SdoProtocol]);
     const COUNTER: u8 = 66;
     let code = version_a().code;
     let newer = signed(code.clone(), |about| about.counter = 3);

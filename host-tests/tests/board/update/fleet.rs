@@ -3,10 +3,13 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use canbus::Time;
 use clap::Parser;
 use host_tests::thorough::either;
+use host_tests::watch::expects;
+use monitor::Rule;
 use nodectl::cli::Cli;
 use serde_json::{Value, json};
 use sign::image::Image;
@@ -86,7 +89,9 @@ pub(super) fn try_update(
     mut outage: Option<Outage>,
     more: &[&str],
 ) -> Result<Vec<Value>, String> {
-    let name = format!("{nodes}-{:08X}-{}.img", image.header.code_crc(), std::process::id());
+    // Tests may run at the same time in one process.
+    static FILES: AtomicU32 = AtomicU32::new(0);
+    let name = format!("{}-{}.img", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::write(&file, image.to_bytes()).unwrap();
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
@@ -173,6 +178,7 @@ fn nodectl_confirms_a_program_on_trial_or_rolls_it_back() {
 /// bootloader refuses it.
 #[test]
 fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
+    let _expected = expects([Rule::SdoProtocol]);
     const BOARD: u8 = 64;
     for (personality, kbit) in PERSONALITIES.into_iter().zip([125, 250, 500, 1000]) {
         let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
@@ -196,6 +202,7 @@ fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
 /// two.
 #[test]
 fn a_node_of_several_is_switched_off_halfway_and_gone_on_with() {
+    let _expected = expects([Rule::HeartbeatLate]);
     let (nodes, off) = either((2, 1), (4, 2));
     let world = boards(nodes);
     let (a, b) = (version_a(), version_b(0));

@@ -4,6 +4,8 @@ use canbus::Time;
 use canopen::sdo::Multiplexer;
 use host_tests::sdo::{Client, Failure};
 use host_tests::thorough::either;
+use host_tests::watch::expects;
+use monitor::Rule;
 use sign::image::Image;
 use update::Status;
 
@@ -89,6 +91,7 @@ fn a_program_that_a_master_speaks_to_is_confirmed_after_ten_seconds_and_stays() 
 /// The program hangs until the watchdog resets the chip, or it faults at once.
 #[test]
 fn a_program_that_does_not_start_is_replaced_by_the_one_before_with_its_settings() {
+    let _expected = expects([Rule::UnexpectedReset]);
     for instruction in [[0xFE, 0xE7], [0x00, 0xDE]] {
         let mut bench = Bench::new("--bitrate 500", 500_000, 1);
         bench.run(SECOND);
@@ -216,6 +219,7 @@ fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
 /// Power cuts at some operations of the return: A runs after each of them.
 #[test]
 fn the_power_goes_on_the_way_back() {
+    let _expected = expects([Rule::HeartbeatLate]);
     let mut bench = Bench::running();
     bench.update(&version_b(0));
     let flash = bench.machine().flash();

@@ -274,14 +274,27 @@ impl<'a> Job<'a> {
         });
         match blocks {
             Err(error) if error.abort().is_some_and(sdo::AbortCode::is_protocol) => (),
-            result => return Ok(result?),
+            result => return result.map_err(|error| self.reason(network, error)),
         }
         if arrived > 0 {
             self.clear(network, watcher)?;
         }
         watcher.step(node, Step::DownloadSegments);
         let progress = |done| watcher.progress(node, done, total);
-        Ok(self.program(network).download_segments(&self.image.bytes, progress)?)
+        let segments = self.program(network).download_segments(&self.image.bytes, progress);
+        segments.map_err(|error| self.reason(network, error))
+    }
+
+    /// Why the node has aborted the download, from its status: the abort code has no details.
+    fn reason(&self, network: &mut Network, error: sdo::Error) -> Error {
+        // The node also answers the segments that were on their way.
+        let _ = network.pause(POLL);
+        let is_refused = |status: &Status| !status.busy && status.code != 0;
+        let status = error.abort().and_then(|_| self.program(network).status().ok().flatten());
+        match status.filter(is_refused) {
+            Some(status) => Error::Flash { node: self.node, status },
+            None => error.into(),
+        }
     }
 
     /// Waits until the flash is no longer busy. Fails unless the status then `is_fine`.
