@@ -382,6 +382,11 @@ impl Bench {
         self.watch.frame(self.now, frame, Sender::Other);
     }
 
+    /// Lets the monitor forget what is saved: the test changes the parameter store itself.
+    pub fn forget_saved(&mut self) {
+        self.watch.incident(self.now, 0, Incident::Injected);
+    }
+
     /// An NMT command for this node.
     pub fn nmt(&mut self, command: u8) {
         let [node_id, _] = self.id().to_le_bytes();

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 
 use canopen::{Frame, Instant, QueueFull, Transmit};
-use monitor::{Breach, Incident, Key, Monitor, Rule, Sender, Sheet};
+use monitor::{Breach, Incident, Initial, Key, Monitor, Rule, Sender, Sheet};
 use node::{FAULTS, Personality};
 use profiles::fault::Flags;
 
@@ -205,8 +205,13 @@ fn read(node: u8, (index, sub): Key, ask: &mut impl FnMut(&Frame, &mut Answers))
 #[must_use]
 pub fn sheet(personality: Personality) -> Sheet {
     let mut sheet = Sheet::from(personality.rows());
-    // The personality, and the choice of virtual devices of a lift.
+    // The personality, and the choice of virtual devices of a lift, which switches on the PDOs that are off by default.
     sheet.changes_pdos.extend([0x2000, 0x2305]);
+    let is_off = |initial: &Initial| matches!(initial, Initial::Bytes(bytes) if bytes.last() >= Some(&0x80));
+    let pdos = sheet.entries.range_mut((0x1800, 0)..(0x1A00, 0)).filter(|(key, _)| key.1 == 1);
+    for (_, entry) in pdos.filter(|(_, entry)| personality == Personality::Lift && is_off(&entry.initial)) {
+        entry.initial = Initial::Unknown;
+    }
     sheet.communication_errors = vec![0x8130, 0x8140];
     // The flags of 3000h, and stored data that could not be loaded.
     let flagged = FAULTS.iter().filter(|fault| fault.flags != Flags::NONE);

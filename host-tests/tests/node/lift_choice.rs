@@ -162,6 +162,7 @@ fn parameters_of_an_older_firmware_keep_switched_off_tpdos_off() {
         let set = |group, value| Change::Set { group, version: 0x0301, value };
         let sets = [set(GroupNumber::Two, &communication[..]), set(GroupNumber::Three, &application)];
         bench.store.store().save(&sets).unwrap();
+        bench.forget_saved();
         let mut bench = bench.power_cycled();
         assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
         assert_eq!(valid(&mut bench)[..2], expected, "2305h = {chosen}");

@@ -317,7 +317,7 @@ impl Device {
             findings.push((Rule::NmtState, format!("a heartbeat with the reserved state {code:02X}h")));
             return;
         };
-        let is_on = self.emcy_id().is_some();
+        let is_on = self.emcy_id().is_some() && self.knows(0x1014) && self.knows(0x1015);
         let inhibited = self.emcy_inhibit().zip(self.errors.last());
         let is_inhibited = inhibited.is_some_and(|(inhibit, last)| at.0 < last.0 + inhibit.0 + 1000);
         let behaviour = self.nmt.demands().and_then(|class| self.values.sure_number(0x1029, class));
@@ -339,6 +339,12 @@ impl Device {
             self.nmt.error(code, class);
             self.is_wishful = true;
         }
+    }
+
+    /// Whether the value of an object is known, or no data sheet has the object.
+    fn knows(&self, index: u16) -> bool {
+        let is_in = self.values.sheet().is_some_and(|sheet| sheet.entries.contains_key(&(index, 0)));
+        !is_in || self.values.sure_number(index, 0).is_some()
     }
 
     /// The CAN-ID of EMCY (1014h); `None` while EMCY is off.

@@ -12,6 +12,7 @@ use storage::{DeviceRecord, Pages, View};
 
 use super::flash::{Flash, PAGE};
 use super::step::{Step, raw};
+use super::watch::Watch;
 
 const PAGES: Pages = Pages::new(0, PAGE);
 /// Frames in the transmit queue, as in the firmware.
@@ -61,6 +62,7 @@ pub(super) struct Board {
     has_parameters: bool,
     /// Whether the node has started since the last step.
     pub(super) has_started: bool,
+    watch: Watch,
 }
 
 impl Board {
@@ -88,6 +90,7 @@ impl Board {
             actions: VecDeque::new(),
             has_parameters: false,
             has_started: false,
+            watch: Watch::new(personality, None),
         };
         board.power_on(Retained::Nothing);
         board.settle();
@@ -117,6 +120,8 @@ impl Board {
             &PowerOn { thermometer: CHIP, retained, ..PowerOn::default() },
         );
         self.measurement.apply(&parameters);
+        self.watch = Watch::new(self.personality, None);
+        self.watch.starts(self.now);
         self.start();
     }
 
@@ -132,6 +137,7 @@ impl Board {
 
     fn start(&mut self) {
         self.out.waiting.clear();
+        self.watch.restarts(self.now);
         let next = self.protocol.start(self.now, &mut self.out);
         self.keep(next);
         self.has_started = true;
@@ -158,7 +164,17 @@ impl Board {
 
     /// The frames that were sent.
     pub(super) fn sent(&mut self) -> Vec<Frame> {
-        if self.out.is_congested { vec![] } else { std::mem::take(&mut self.out.waiting) }
+        if self.out.is_congested {
+            return vec![];
+        }
+        let frames = std::mem::take(&mut self.out.waiting);
+        frames.iter().for_each(|frame| self.watch.sent(self.now, frame));
+        frames
+    }
+
+    /// Starts with a new monitor: frames were lost, or the bus has stopped the node.
+    fn watch_anew(&mut self) {
+        self.watch = Watch::new(self.personality, self.node_id());
     }
 
     /// Carries out one step and all its consequences at this instant.
@@ -180,10 +196,14 @@ impl Board {
             }
             Step::Bus(report) => {
                 let _ = self.protocol.bus_event(report.into(), self.now);
+                self.watch_anew();
             }
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
-            Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
+            Step::Congest(is_congested) => {
+                self.out = Queue { is_congested, ..Queue::default() };
+                self.watch_anew();
+            }
             Step::PowerCycle => self.power_on(self.retained()),
             Step::PowerCut { after } => self.flash.cut_after(after),
         }
@@ -208,6 +228,9 @@ impl Board {
         let id = id & 0x7FF;
         let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data[..usize::from(len)]) };
         let frame = frame.expect("an identifier of 11 bits and at most eight bytes");
+        if self.filters.iter().flatten().any(|passed| *passed == id) {
+            self.watch.received(self.now, &frame);
+        }
         if self.filters[0].contains(&id) {
             let _ = self.protocol.on_process_frame(&frame, self.now, &mut self.out);
         }
