@@ -233,3 +233,14 @@ fn without_an_argument_the_commands_are_listed_a_line_each() {
     }
     assert!(says.lines().all(|line| line.starts_with("cargo xtask ") && line.len() < 130), "{says}");
 }
+
+#[test]
+fn a_dry_run_installs_no_cpu_library() {
+    let machine = Machine::new("dry").with("pkg-config", WORKS).with("python3", WORKS).with("cmake", WORKS);
+    machine.says();
+    let python = machine.calls("python3");
+    assert!(!python.iter().any(|call| call.contains("-m venv")), "{python:?}");
+    for name in ["cpu-library", "cpu-library.missing"] {
+        assert!(!machine.root.join("target").join(name).exists(), "{name}");
+    }
+}

@@ -40,6 +40,7 @@ pub(super) fn missing() -> Vec<Package> {
 
 fn make() -> Result<Vec<(OsString, OsString)>> {
     super::install(&[Need::Emulator])?;
+    cpu_library::install();
     if let Some(found) = find() {
         return Ok(found);
     }
