@@ -224,7 +224,7 @@ mod tests {
             port.pump(Time::ZERO);
         }
         // The mailboxes hold 389h, 489h and 589h; 389h is on the wire.
-        assert_eq!(run(&mut bus, &mut port, &mut other, BIT * 50), []);
+        assert_eq!(run(&mut bus, &mut port, &mut other, BIT * 50), Vec::<u16>::new());
         for id in [0x289, 0x189] {
             port.send(Frame::new(id, &[0; 8]).unwrap()).unwrap();
             port.pump(BIT * 50);
