@@ -83,7 +83,8 @@ class Simulator:
         command += [word for node, device in self.devices.items() for word in ("--device", f"{node}={device}")]
         result = subprocess.run(command + ["--factory"] * self.is_new, capture_output=True, text=True)
         assert result.returncode in (0, 10), result.stderr
-        breaches = [json.loads(line) for line in result.stdout.splitlines() if "rule" in line]
+        lines = [json.loads(line) for line in result.stdout.splitlines()]
+        breaches = [line for line in lines if "rule" in line]
         found = {breach["rule"] for breach in breaches}
         new = [breach for breach in breaches if breach["rule"] not in self.expected]
         assert not new, f"a rule of the bus is broken: {json.dumps(new[0], indent=1)}"

@@ -13,18 +13,18 @@ class Nodectl:
 
     def __init__(self, simulator: Simulator, case: Case):
         bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
-        # At 10 kbit/s a frame takes 13 ms, and the simulator is faster than real time.
         self.command = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", str(case.node), "--json"]
-        self.command += ["--timeout", "20000", "--limit", "120"]
         self.wait()
 
-    def run(self, *arguments: str) -> subprocess.CompletedProcess:
-        return subprocess.run([*self.command, *arguments], capture_output=True, text=True)
+    def run(self, *arguments: str, timeout: int = 20000) -> subprocess.CompletedProcess:
+        """Runs a command. At 10 kbit/s a frame takes 13 ms, and the machine may be busy."""
+        limits = ["--timeout", str(timeout), "--limit", "120"]
+        return subprocess.run([*self.command, *limits, *arguments], capture_output=True, text=True)
 
     def wait(self) -> None:
         """Waits until the node answers."""
         for _ in range(60):
-            if self.run("--timeout", "1000", "read", "1000").returncode == 0:
+            if self.run("read", "1000", timeout=1000).returncode == 0:
                 return
         raise AssertionError("the node does not answer")
 

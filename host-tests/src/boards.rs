@@ -48,8 +48,9 @@ impl Observer for Listener {
         self.0.incident(instant(at), board, incident);
     }
 
-    fn power_on(&mut self, at: Time, board: usize) {
-        self.0.incident(instant(at), board, Incident::PowerOn);
+    fn power(&mut self, at: Time, board: usize, is_on: bool) {
+        let incident = if is_on { Incident::PowerOn } else { Incident::PowerOff };
+        self.0.incident(instant(at), board, incident);
     }
 
     fn touched(&mut self, at: Time, board: usize) {

@@ -50,6 +50,8 @@ impl Drop for Expected {
 #[derive(Debug)]
 pub struct Watch {
     monitor: Monitor,
+    /// Values are read beside the bus.
+    reads: bool,
     /// The names of the expected rules, for the count of tests.
     named: Vec<&'static str>,
 }
@@ -60,13 +62,18 @@ impl Watch {
     pub fn of_bus(bits_per_second: u32) -> Watch {
         let mut monitor = Monitor::new();
         monitor.set_bit_rate(bits_per_second);
-        Watch { monitor, named: Vec::new() }
+        Watch { monitor, reads: true, named: Vec::new() }
     }
 
     /// Watches a node without a bus.
     #[must_use]
     pub fn without_bus() -> Watch {
-        Watch { monitor: Monitor::new().without_bus(), named: Vec::new() }
+        Watch { monitor: Monitor::new().without_bus(), reads: true, named: Vec::new() }
+    }
+
+    /// Reads no values beside the bus: for a test in which the SDO server must see the requests of the test only.
+    pub fn read_nothing(&mut self) {
+        self.reads = false;
     }
 
     /// Feeds the monitor.
@@ -128,7 +135,7 @@ impl Watch {
         let is_download = command >> 5 == 1 || command & 0xE1 == 0xC0;
         let Some(node) = self.monitor.node_id(participant) else { return };
         let is_request = is_download && request.id() == 0x600 + u16::from(node);
-        if !is_request || !self.monitor.is_wanted_before(participant, key) {
+        if !is_request || !self.reads || !self.monitor.is_wanted_before(participant, key) {
             return;
         }
         if let Some(value) = read(node, key, &mut ask) {
@@ -139,7 +146,8 @@ impl Watch {
     /// Reads the values that decide a rule from the SDO server of a node, beside the bus: `ask` passes a request to
     /// the server and its answers to the queue.
     pub fn probe(&mut self, at: Instant, participant: usize, mut ask: impl FnMut(&Frame, &mut Answers)) {
-        for key in self.monitor.wishes(participant) {
+        let wishes = if self.reads { self.monitor.wishes(participant) } else { Vec::new() };
+        for key in wishes {
             let Some(node) = self.monitor.node_id(participant) else { return };
             if let Some(value) = read(node, key, &mut ask) {
                 self.feed(|monitor| monitor.value(at, participant, key, &value));

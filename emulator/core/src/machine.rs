@@ -188,6 +188,11 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.power_ons
     }
 
+    /// Whether the supply is on.
+    pub fn is_powered(&self) -> bool {
+        self.powered
+    }
+
     /// Switches the supply off: RAM loses its content, flash keeps it.
     pub fn power_off(&mut self) {
         self.powered = false;

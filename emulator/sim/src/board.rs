@@ -212,6 +212,11 @@ impl Board {
         self.machine.power_ons()
     }
 
+    /// Whether the board is switched on.
+    pub(crate) fn is_powered(&self) -> bool {
+        self.machine.is_powered()
+    }
+
     /// The incidents since power-on.
     pub(crate) fn incidents(&self) -> &[(Time, Incident)] {
         self.machine.incidents()

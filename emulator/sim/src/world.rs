@@ -41,8 +41,8 @@ pub trait Observer {
     fn frame(&mut self, at: Time, frame: &Frame, board: Option<usize>);
     /// An incident of a board.
     fn incident(&mut self, at: Time, board: usize, incident: &Incident);
-    /// A board was switched on.
-    fn power_on(&mut self, at: Time, board: usize);
+    /// A board was switched on or off.
+    fn power(&mut self, at: Time, board: usize, is_on: bool);
     /// A test may change the machine of a board.
     fn touched(&mut self, at: Time, board: usize);
     /// The boards have reached this time.
@@ -68,8 +68,16 @@ pub struct World {
     enforces_rules: bool,
     stimuli_changes: u64,
     observer: Option<Box<dyn Observer>>,
-    /// The incidents and the power-ons of each board that the observer knows.
-    observed: Vec<(usize, u64)>,
+    /// What the observer knows of each board.
+    observed: Vec<Observed>,
+}
+
+/// What an observer knows of a board.
+#[derive(Clone, Copy)]
+struct Observed {
+    incidents: usize,
+    power_ons: u64,
+    is_powered: bool,
 }
 
 /// A port, and whether a client uses it.
@@ -125,7 +133,7 @@ impl World {
 
     /// Shows an observer everything from now on, or nothing.
     pub fn observe(&mut self, observer: Option<Box<dyn Observer>>) {
-        self.observed = self.boards.iter().map(|board| (0, board.power_ons())).collect();
+        self.observed = self.boards.iter().map(Observed::of).collect();
         self.observer = observer;
         let bit_rate = self.bit_rate();
         if let Some(observer) = &mut self.observer {
@@ -291,16 +299,17 @@ impl World {
 
     fn show_incidents(&mut self) {
         let Some(observer) = &mut self.observer else { return };
-        for (number, (board, (incidents, power_ons))) in
-            self.boards.iter().zip(&mut self.observed).enumerate()
-        {
-            if *power_ons != board.power_ons() {
-                *power_ons = board.power_ons();
-                observer.power_on(self.now, number);
+        for (number, (board, known)) in self.boards.iter().zip(&mut self.observed).enumerate() {
+            if known.power_ons != board.power_ons() {
+                observer.power(self.now, number, true);
             }
-            for (at, incident) in board.incidents().iter().skip(*incidents) {
+            if known.is_powered && !board.is_powered() {
+                observer.power(self.now, number, false);
+            }
+            (known.power_ons, known.is_powered) = (board.power_ons(), board.is_powered());
+            for (at, incident) in board.incidents().iter().skip(known.incidents) {
                 observer.incident(*at, number, incident);
-                *incidents += 1;
+                known.incidents += 1;
             }
         }
     }
@@ -371,6 +380,13 @@ impl World {
             nodes: nodes.collect(),
             host_time: self.host_time,
         }
+    }
+}
+
+impl Observed {
+    /// The present supply, and no incident.
+    fn of(board: &Board) -> Observed {
+        Observed { incidents: 0, power_ons: board.power_ons(), is_powered: board.is_powered() }
     }
 }
 

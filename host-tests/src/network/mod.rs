@@ -74,6 +74,13 @@ impl<U: Unit> Network<U> {
         self
     }
 
+    /// The SDO servers get the requests on the bus only, none of the monitor.
+    #[must_use]
+    pub fn without_reads(mut self) -> Network<U> {
+        self.watch.read_nothing();
+        self
+    }
+
     /// Power-on, for all stations at once.
     pub fn start(&mut self) {
         let now = self.instant();

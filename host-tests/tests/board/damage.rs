@@ -2,6 +2,8 @@
 //! damaged group and the values used instead. It reports no other group.
 
 use canbus::{Id, Time};
+use host_tests::watch::expects;
+use monitor::Rule;
 use sim::world::World;
 
 use crate::support::{Master, SECOND, world};
@@ -182,6 +184,7 @@ enum Kind {
 /// Every group and every kind of damage.
 #[test]
 fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_instead() {
+    let _expected = expects([Rule::SaveLost]);
     for group in ALL {
         for kind in [Kind::Newest, Kind::Superseded, Kind::Only] {
             let mut examiner = Examiner::new();

@@ -107,7 +107,8 @@ fn said_on_the_board(world: &mut World, master: &Master, script: &[Line]) -> Sai
 
 fn said_in_this_process(serial_number: u32, script: &[Line]) -> Said {
     let raw = bench::raw(100_000.0, 298.15);
-    let mut network = Network::new([PressureNode::pressure(NodeId::new(ID), serial_number, raw)]);
+    let mut network =
+        Network::new([PressureNode::pressure(NodeId::new(ID), serial_number, raw)]).without_reads();
     network.start();
     network.run(Duration::from_millis(1000));
     while network.hear().is_some() {}

@@ -51,7 +51,7 @@ fn choose_all(world: &mut World, master: &Master) {
 }
 
 fn loaded(personality: &str, kbit: u32) -> Seen {
-    let noise = "--pressure sine:250000,200000,7 --shaft ramp:3";
+    let noise = "--pressure sine:250000,200000,7 --shaft ramp:0,60,20";
     let mut world = world(&format!("--bitrate {kbit} --node 1:{personality} {noise}"));
     let master = Master::join_at(&mut world, kbit * 1000);
     world.run_until(SECOND);

@@ -66,10 +66,11 @@ impl Nmt {
         *self = Nmt::default();
     }
 
-    /// An EMCY: explains a change. `class`: the sub-index of 1029h for this error, if known.
+    /// An EMCY: explains a change. `class`: the sub-index of 1029h for this error, if known. A command that no heartbeat
+    /// has shown yet may have come after the error.
     pub(crate) fn error(&mut self, code: u16, class: Option<u8>) {
         self.explained = EXPLAINED;
-        if let Some(class) = class {
+        if let Some(class) = class.filter(|_| self.commands.is_empty()) {
             self.demand = Some(Demand { code, class, heartbeats: 0 });
         }
     }

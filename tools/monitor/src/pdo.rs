@@ -10,6 +10,9 @@ use crate::{Findings, Rule};
 /// Tolerance for the times of frames on a bus, in us: the node queues a frame some time before the bus carries it.
 const TOLERANCE: f64 = 500.0;
 
+/// Messages of a TPDO that wait for the bus at most: one in the queue, and one in each of three mailboxes.
+const WAITING: u32 = 4;
+
 /// The settings of a TPDO, as far as they are known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
@@ -91,7 +94,7 @@ impl Pdos {
         for index in values.keys(0x1800, 0x19FF, 1) {
             let every = values.number(index, 2).unwrap_or(1).clamp(1, 240);
             let sent = self.sent.entry(index).or_default();
-            sent.syncs = if sent.syncs > 2 * every { 2 * every } else { (sent.syncs + 1).min(2 * every) };
+            sent.syncs = (sent.syncs + 1).min(WAITING * every);
         }
     }
 

@@ -80,13 +80,13 @@ pub(crate) struct Channel {
     expect: Expect,
     /// When the server has got its turn.
     since: Instant,
-    /// An answer to a request before may still be on its way.
-    is_crossing: bool,
+    /// Answers to requests before that may still be on their way: the client did not wait for them.
+    crossing: u16,
 }
 
 impl Channel {
     pub(crate) fn new() -> Channel {
-        Channel { transfer: None, expect: Expect::Anything, since: Instant(0), is_crossing: false }
+        Channel { transfer: None, expect: Expect::Anything, since: Instant(0), crossing: 0 }
     }
 
     /// The server has restarted: there is no transfer.
@@ -123,6 +123,9 @@ impl Channel {
             self.expect = Expect::Anything;
             return None;
         };
+        if self.expect == Expect::Nothing && now.0 > self.since.0.saturating_add(TIME_OUT) {
+            self.crossing = 0;
+        }
         self.since = now;
         if self.is_within_block_download() && data[0] != 0x80 {
             self.take_segment(data);
@@ -155,7 +158,9 @@ impl Channel {
     }
 
     fn begin(&mut self, transfer: Option<Transfer>) -> Option<Event> {
-        self.is_crossing = !matches!(self.expect, Expect::Nothing);
+        if self.expect != Expect::Nothing {
+            self.crossing = self.crossing.saturating_add(1);
+        }
         let Some(transfer) = transfer else {
             (self.transfer, self.expect) = (None, Expect::Anything);
             return None;
@@ -167,11 +172,13 @@ impl Channel {
     }
 
     fn client_abort(&mut self) -> Option<Event> {
-        self.is_crossing = self.expect != Expect::Nothing;
-        self.expect = if self.is_crossing { Expect::Anything } else { Expect::Nothing };
+        let is_crossing = self.expect != Expect::Nothing;
+        if is_crossing {
+            (self.crossing, self.expect) = (self.crossing.saturating_add(1), Expect::Anything);
+        }
         // The answer may have been on its way: a download whose last frame was sent may have had its effect.
         let transfer = self.transfer.take()?;
-        (transfer.is_download && !self.is_crossing).then_some(Event::Aborted(transfer.key, transfer.data))
+        (transfer.is_download && !is_crossing).then_some(Event::Aborted(transfer.key, transfer.data))
     }
 
     /// A request within a transfer. Returns whether it fits.
@@ -249,17 +256,21 @@ impl Channel {
             return self.server_abort(data, findings);
         }
         match self.judge(data) {
-            Ok(event) => {
-                self.is_crossing = false;
-                event
-            }
-            Err(_) if std::mem::take(&mut self.is_crossing) => None,
+            Ok(event) => event,
+            Err(_) if self.was_crossing() => None,
             Err(text) => {
                 findings.push((Rule::SdoProtocol, text));
                 (self.transfer, self.expect) = (None, Expect::Anything);
                 None
             }
         }
+    }
+
+    /// Whether the answer may be one to a request before; there is one fewer then.
+    fn was_crossing(&mut self) -> bool {
+        let was_crossing = self.crossing > 0;
+        self.crossing = self.crossing.saturating_sub(1);
+        was_crossing
     }
 
     /// A frame that cannot be judged. An abort or a final answer still ends what was begun.
@@ -271,7 +282,7 @@ impl Channel {
 
     fn server_abort(&mut self, data: [u8; 8], findings: &mut Findings) -> Option<Event> {
         let Some(transfer) = self.transfer.take_if(|transfer| transfer.key == key(data)) else {
-            if !std::mem::take(&mut self.is_crossing) {
+            if !self.was_crossing() {
                 let (index, sub) = key(data);
                 let text = format!("an abort for {index:04X}h:{sub}, which is not transferred");
                 findings.push((Rule::SdoProtocol, text));

@@ -32,6 +32,8 @@ pub enum Sender {
 pub enum Incident {
     /// The node is switched on, or loses its power and gets it again.
     PowerOn,
+    /// The node is switched off.
+    PowerOff,
     /// The caller starts the node again: the next boot-up message has a reason.
     Restart,
     /// The program has reset the chip.
@@ -155,7 +157,7 @@ impl Monitor {
         match incident {
             Incident::Restart => device.may_restart(),
             Incident::Touched => device.touch(),
-            Incident::PowerOn | Incident::SoftwareReset => device.restart(Scope::All, at),
+            Incident::PowerOn | Incident::PowerOff | Incident::SoftwareReset => device.restart(Scope::All, at),
             Incident::ChipReset => {
                 let was_touched = device.chip_reset(at);
                 if !was_injected && !was_touched {

@@ -57,12 +57,11 @@ pub fn of_data_sheet(eds: &Eds, node: NodeId) -> Sheet {
     let entries = eds.entries().map(|entry| {
         let is_parameter =
             entry.access == Access::ReadWrite && Sheet::is_communication_parameter((entry.index, entry.sub));
-        let entry = monitor::Entry {
+        monitor::Entry {
             kind: if is_parameter { Kind::Parameter } else { Kind::Volatile },
             initial: initial(entry, node),
             group: is_parameter.then_some(2),
-        };
-        entry
+        }
     });
     let keys = eds.entries().map(|entry| (entry.index, entry.sub));
     // Any object of the manufacturer may change the PDOs.
@@ -71,9 +70,8 @@ pub fn of_data_sheet(eds: &Eds, node: NodeId) -> Sheet {
 }
 
 fn initial(entry: &Entry, node: NodeId) -> Initial {
-    let bits = match entry.data_type.class() {
-        Class::Signed(bits) | Class::Unsigned(bits) => bits,
-        _ => return Initial::Unknown,
+    let (Class::Signed(bits) | Class::Unsigned(bits)) = entry.data_type.class() else {
+        return Initial::Unknown;
     };
     match &entry.default {
         Some(Formula::NodeId(base)) => u32::try_from(*base).map_or(Initial::Unknown, Initial::NodeId),

@@ -57,10 +57,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.process_next()
     }
 
-    /// Reacts to an error as object 1029h says, with the next poll of the services. A [`Condition`](crate::Condition)
-    /// with a class needs no such call: its fault is the error.
+    /// Reacts to an error as object 1029h says. A [`Condition`](crate::Condition) with a class needs no such call: its
+    /// fault is the error.
     pub fn error(&mut self, class: ErrorClass) -> Next {
         self.body.emcy.add_error(class);
+        self.body.react();
         self.body.basic.services_due = STALE;
         self.process_next()
     }
@@ -69,7 +70,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    /// Applies object 1029h to the errors since the last call. Called after the EMCYs, which give the reason.
+    /// Applies object 1029h to the errors since the last call.
     ///
     /// Stopped has no EMCY. A node that has to stop is therefore Pre-operational until its EMCYs are sent; after
     /// bus-off, that is after the recovery.
