@@ -49,7 +49,7 @@ def test_nmt(board: Simulator, case: Case):
 
 def test_scan_and_info(board: Simulator, case: Case):
     nodectl = Nodectl(board, case)
-    assert [node["node"] for node in nodectl("scan")] == [case.node]
+    assert [node["node"] for node in nodectl("scan")[0]["nodes"]] == [case.node]
     assert nodectl("info")
 
 

@@ -10,7 +10,9 @@ const KEPT: usize = 8192;
 const BIT_RATES: [f64; 9] = [1e4, 2e4, 5e4, 1e5, 1.25e5, 2.5e5, 5e5, 8e5, 1e6];
 /// Longest gap in bits between two frames that follow each other without a pause.
 const GAP: f64 = 25.0;
-/// The same, with an error frame between the two, and with a frame that an error has destroyed.
+/// Gaps in bits with an error frame between the two: the shortest, with some tolerance (14 bits and the interframe space),
+/// the longest, and the longest with a frame that an error has destroyed.
+const SHORTEST_ERROR_GAP: f64 = 10.0;
 const ERROR_GAP: f64 = 80.0;
 const DESTROYED_GAP: f64 = 400.0;
 
@@ -100,7 +102,7 @@ impl Bus {
         is_repeated
     }
 
-    /// Whether the frame follows an equal one of its sender without a pause. Between the two of an SDO server, more
+    /// Whether the frame follows an equal one of its sender without a pause, after an error frame. Between the two of an SDO server, more
     /// urgent frames may have passed.
     fn is_repetition(&self, start: f64, frame: &Frame, device: Option<usize>) -> bool {
         const FRAMES: usize = 64;
@@ -112,7 +114,8 @@ impl Bus {
                 return false;
             }
             if passed.device == device && passed.frame.id() == frame.id() {
-                return passed.frame == *frame;
+                let has_error_frame = is_sdo || next - passed.end >= SHORTEST_ERROR_GAP * self.bit();
+                return passed.frame == *frame && has_error_frame;
             }
             if passed.frame.id() > frame.id() {
                 return false;

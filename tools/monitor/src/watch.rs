@@ -157,7 +157,9 @@ impl Monitor {
         match incident {
             Incident::Restart => device.may_restart(),
             Incident::Touched => device.touch(),
-            Incident::PowerOn | Incident::PowerOff | Incident::SoftwareReset => device.restart(Scope::All, at),
+            Incident::PowerOn | Incident::PowerOff | Incident::SoftwareReset => {
+                device.restart(Scope::All, at)
+            }
             Incident::ChipReset => {
                 let was_touched = device.chip_reset(at);
                 if !was_injected && !was_touched {
