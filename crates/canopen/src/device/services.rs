@@ -7,7 +7,7 @@ use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::pdo::Budget;
 use crate::sdo::{Abort, Server};
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{Context, ProcessContext, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
@@ -75,7 +75,7 @@ impl Services {
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
     pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching(), budget: None }
+        Context { now, out, is_open: !self.lss.is_switching() }
     }
 
     /// The same for process data, which have a share of the bus.
@@ -83,8 +83,8 @@ impl Services {
         &'a mut self,
         now: Instant,
         out: &'a mut Q,
-    ) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching(), budget: Some(&mut self.budget) }
+    ) -> ProcessContext<'a, Q> {
+        ProcessContext { now, out, is_open: !self.lss.is_switching(), budget: &mut self.budget }
     }
 }
 

@@ -8,7 +8,7 @@
 use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
 use crate::sdo::Multiplexer;
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{ProcessContext, RETRY};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
@@ -173,7 +173,7 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects whose value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
             for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
@@ -185,7 +185,7 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Some(settings) = self.settings else { return };
         let elapsed = context.now >= self.event_due;
         if elapsed {

@@ -9,7 +9,7 @@
 
 use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{ProcessContext, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
@@ -147,7 +147,7 @@ impl Tpdo {
     }
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
+    pub(crate) fn asks_for_event(&mut self, context: &ProcessContext<'_, impl Transmit>) -> Option<u16> {
         let number = self.events_of()?;
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
@@ -166,7 +166,7 @@ impl Tpdo {
         &mut self,
         is_event: bool,
         image: &[u8],
-        context: &mut Context<'_, impl Transmit>,
+        context: &mut ProcessContext<'_, impl Transmit>,
     ) {
         if is_event || self.events.is_silent && self.data.is_some() {
             self.send(image, context);
@@ -203,7 +203,7 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let transmission = self.settings.transmission;
         match transmission {
             Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
@@ -237,7 +237,7 @@ impl Tpdo {
 
     /// Answers a remote frame; the types 254 and 255 answer when the inhibit time is over. TPDOs of the synchronous types
     /// 0 to 240 are sent by SYNC only and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
             return;
@@ -263,7 +263,7 @@ impl Tpdo {
     }
 
     /// Sends the values if a mapped value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         if self.settings.sends_on_change() && self.has_changed(image) {
             self.pending = true;
             self.poll(image, context);
@@ -284,7 +284,7 @@ impl Tpdo {
     }
 
     /// Sends the TPDO if a transmission is due.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let elapsed = context.now >= self.event_due;
         let sends_events = self.events_of().is_some();
         if elapsed || sends_events && self.event_due == Instant::NEVER {
@@ -311,7 +311,7 @@ impl Tpdo {
     }
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
-    fn send(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    fn send(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Settings { id, layout, transmission, .. } = &self.settings;
         let data = layout.gather(image);
         let frame = Frame::data_frame(*id, layout.len(), data);
