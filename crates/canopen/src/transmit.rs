@@ -89,9 +89,11 @@ pub struct ProcessContext<'a, T> {
 impl<T: Transmit> ProcessContext<'_, T> {
     /// Queues a PDO with present values, which a newer one may replace. `false` when there is no room beside the services,
     /// or the process data have taken their share of the bus.
+    #[inline(always)]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
+        let len = frame.len();
         let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(&frame, self.now);
-        is_admitted && self.out.send_state(frame).is_ok() && self.spend(&frame)
+        is_admitted && self.out.send_state(frame).is_ok() && self.spend(len)
     }
 
     /// Queues a multiplexed PDO. `false` when there is no room beside all others, or no share of the bus is left.
@@ -102,7 +104,8 @@ impl<T: Transmit> ProcessContext<'_, T> {
     /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it. `false` when there is
     /// no room beside all others.
     pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
-        self.has_room_for_event() && self.out.send(frame).is_ok() && self.spend(&frame)
+        let len = frame.len();
+        self.has_room_for_event() && self.out.send(frame).is_ok() && self.spend(len)
     }
 
     /// Whether `send_event` would take a frame now.
@@ -110,8 +113,8 @@ impl<T: Transmit> ProcessContext<'_, T> {
         self.room() > ROOM_FOR_OTHERS
     }
 
-    fn spend(&mut self, frame: &Frame) -> bool {
-        self.budget.spend(frame);
+    fn spend(&mut self, len: usize) -> bool {
+        self.budget.spend(len);
         true
     }
 

@@ -170,6 +170,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let due = due.min(self.scanner.due()).min(self.sync.due());
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
         debug_assert!(due > context.now, "process data are still due after a poll");
-        self.basic.process_due = due.max(context.now + Duration(1));
+        self.basic.process_due = due.max(context.now.plus(Duration(1)));
     }
 }

@@ -170,7 +170,7 @@ impl<B: Body> Node<B> {
         let has_reply = server.send_block(&self.body, context.now, |data| {
             context.room() > B::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
-        let block_due = if server.is_sending() { context.now + RETRY } else { Instant::NEVER };
+        let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Instant::NEVER };
         self.services.block_due = block_due;
         self.body.basic_mut().serve_until(block_due);
         if has_reply {
@@ -186,7 +186,7 @@ impl<B: Body> Node<B> {
         if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
             self.services.reply_due = Instant::NEVER;
         } else {
-            self.services.reply_due = context.now + RETRY;
+            self.services.reply_due = context.now.plus(RETRY);
             basic.serve_until(self.services.reply_due);
         }
     }

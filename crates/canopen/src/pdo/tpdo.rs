@@ -44,9 +44,10 @@ impl Settings {
     };
 
     /// The end of the inhibit time after a transmission. The types 254 and 255 have an inhibit time (CiA 301, 7.5.2.35).
-    fn inhibit_end(&self, sent: Option<Instant>) -> Instant {
+    fn inhibit_end(&self, sent: Instant) -> Instant {
         match sent {
-            Some(sent) if self.transmission.is_event_driven() => sent + Duration::from_inhibit(self.inhibit),
+            Instant::NEVER => Instant(0),
+            _ if self.transmission.is_event_driven() => sent.plus(Duration::from_inhibit(self.inhibit)),
             _ => Instant(0),
         }
     }
@@ -74,8 +75,8 @@ pub(crate) struct Tpdo {
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
     event_due: Instant,
-    /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
-    sent: Option<Instant>,
+    /// The last transmission since the last reset, or `NEVER`. No reconfiguration shortens the inhibit time.
+    sent: Instant,
     /// The end of the inhibit time; earlier, a transmission waits.
     inhibited_until: Instant,
     /// When to ask the application for events. Used only for a TPDO that sends events.
@@ -110,7 +111,7 @@ impl Tpdo {
             is_counting: false,
             data: None,
             event_due: Instant::NEVER,
-            sent: None,
+            sent: Instant::NEVER,
             inhibited_until: Instant(0),
             events: Events::NONE,
         }
@@ -155,7 +156,7 @@ impl Tpdo {
             && !self.pending
             && context.now >= self.inhibited_until;
         if is_asked_now && !context.has_room_for_event() {
-            (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
+            (self.events.may_wait, self.inhibited_until) = (true, context.now.plus(RETRY));
             return None;
         }
         is_asked_now.then_some(number)
@@ -193,7 +194,7 @@ impl Tpdo {
 
     /// Ends the inhibit time, at a reset.
     pub(crate) fn reset(&mut self) {
-        self.sent = None;
+        self.sent = Instant::NEVER;
         self.stop();
     }
 
@@ -306,28 +307,37 @@ impl Tpdo {
             return Instant::NEVER;
         }
         let period = Duration::from_millis(self.settings.event.into());
-        let next = self.event_due + period;
-        if self.event_due != Instant::NEVER && next > now { next } else { now + period }
+        let last = if self.event_due == Instant::NEVER { now } else { self.event_due };
+        let next = last.plus(period);
+        if next > now { next } else { now.plus(period) }
     }
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
     fn send(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Settings { id, layout, transmission, .. } = &self.settings;
         let data = layout.gather(image);
-        let frame = Frame::data_frame(*id, layout.len(), data);
+        let frame = || Frame::data_frame(*id, layout.len(), data);
         let sends_events = self.settings.events_of.is_some();
-        let is_sent = if sends_events { context.send_event(frame) } else { context.send_pdo(frame) };
+        let is_sent = if sends_events { context.send_event(frame()) } else { context.send_pdo(frame()) };
         self.pending = !is_sent;
         if is_sent {
-            (self.data, self.sent) = (Some(data), Some(context.now));
-            if self.settings.inhibit != 0 {
-                self.inhibited_until = self.settings.inhibit_end(self.sent);
-            }
+            (self.data, self.sent) = (Some(data), context.now);
         } else {
-            self.inhibited_until = context.now + RETRY;
+            self.inhibited_until = context.now.plus(RETRY);
         }
-        if transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(context.now);
+        if transmission.is_event_driven() {
+            self.restart_timers(context.now);
+        }
+    }
+
+    /// A TPDO of type 254 or 255 has been sent, or has to wait.
+    #[inline(never)]
+    fn restart_timers(&mut self, now: Instant) {
+        if !self.pending && self.settings.inhibit != 0 {
+            self.inhibited_until = self.settings.inhibit_end(self.sent);
+        }
+        if self.event_due == Instant::NEVER {
+            self.event_due = self.following_event(now);
         }
     }
 }
