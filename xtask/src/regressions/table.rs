@@ -58,7 +58,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_tpdo_every_millisecond_leaves_room_at_every_bit_rate",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= LONGEST || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
             fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
@@ -68,7 +68,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_noisy_pressure_without_inhibit_time_leaves_room",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= LONGEST || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
             fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
@@ -78,7 +78,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::three_position_units_of_a_lift_leave_room_by_their_defaults",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= LONGEST || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
             fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
@@ -88,7 +88,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_cyclic_timer_of_a_millisecond_leaves_room",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= LONGEST || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
             fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },

@@ -9,14 +9,15 @@ use crate::transmit::RETRY;
 use crate::{Duration, Frame, Instant};
 
 /// The share: `SHARE` / 4 of the bus.
-const SHARE: u64 = 3;
-/// Time over which credit accumulates.
-const WINDOW: Duration = Duration::from_millis(250);
+const SHARE: u32 = 3;
+/// Time over which credit accumulates, in microseconds.
+const WINDOW: u32 = 250_000;
 /// A claim that is not renewed has ended: a waiting PDO tries again each millisecond.
 const CLAIM: Duration = Duration(3 * RETRY.0);
 
-/// The cost of the longest PDO.
-const LONGEST: u32 = cost(8);
+/// Credit that is enough for any PDO; a power of two, which one instruction compares.
+const ENOUGH: u32 = 1 << 18;
+const _: () = assert!(ENOUGH > cost(8), "the longest PDO costs less");
 
 /// Credit for process data, in thousandths of a bit.
 #[derive(Debug)]
@@ -25,7 +26,7 @@ pub(crate) struct Budget {
     kbit: u16,
     /// The CAN-ID of the PDO with the first claim.
     claimant: u16,
-    /// The end of the claim. Until then only the claimant earns credit, so nobody has enough for the longest PDO.
+    /// The end of the claim. Until then only the claimant earns credit, so the credit is short for all others.
     claim_end: Instant,
     credit: u32,
     refilled: Instant,
@@ -51,7 +52,7 @@ impl Budget {
     /// Whether a PDO may be sent now.
     #[inline]
     pub(crate) fn admits(&mut self, frame: &Frame, now: Instant) -> bool {
-        self.credit >= LONGEST || self.admits_scarce(frame.id(), frame.len(), now)
+        self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)
     }
 
     #[inline(never)]
@@ -72,18 +73,15 @@ impl Budget {
     }
 
     fn refill(&mut self, now: Instant) {
-        let elapsed = now.0.saturating_sub(self.refilled.0).min(WINDOW.0);
-        let earned = elapsed * u64::from(self.kbit) * SHARE / 4;
-        let earned = u32::try_from(earned).unwrap_or(u32::MAX);
-        (self.credit, self.refilled) = (self.credit.saturating_add(earned).min(limit(self.kbit)), now);
+        let elapsed = u32::try_from(now.0 - self.refilled.0).unwrap_or(WINDOW).min(WINDOW);
+        let earned = elapsed * u32::from(self.kbit) * SHARE / 4;
+        (self.credit, self.refilled) = ((self.credit + earned).min(limit(self.kbit)), now);
     }
 }
 
 /// The most credit that accumulates.
 const fn limit(kbit: u16) -> u32 {
-    #[allow(clippy::cast_possible_truncation, reason = "below 2^32 for every u16")]
-    let limit = (WINDOW.0 / 1000 * kbit as u64 * SHARE / 4) as u32;
-    limit.saturating_mul(1000)
+    WINDOW * SHARE / 4 * kbit as u32
 }
 
 /// The longest frame with this number of bytes, with stuff bits and the space after it: 55 bits and ten for each byte.

@@ -238,6 +238,7 @@ impl Tpdo {
 
     /// Answers a remote frame; the types 254 and 255 answer when the inhibit time is over. TPDOs of the synchronous types
     /// 0 to 240 are sent by SYNC only and do not answer.
+    #[inline(never)]
     pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
