@@ -54,8 +54,6 @@ pub struct Context<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
-    /// The share of process data in the bus. Services have none, and are not limited.
-    pub(crate) budget: Option<&'a mut Budget>,
 }
 
 impl<T: Transmit> Context<'_, T> {
@@ -74,21 +72,40 @@ impl<T: Transmit> Context<'_, T> {
         self.is_open && self.out.send_state(frame).is_ok()
     }
 
+    /// How many frames `send` would take now.
+    pub(crate) fn room(&self) -> usize {
+        if self.is_open { self.out.room() } else { 0 }
+    }
+}
+
+/// One call of the device for its process data, which have a share of the bus.
+pub struct ProcessContext<'a, T> {
+    pub(crate) now: Instant,
+    pub(crate) out: &'a mut T,
+    pub(crate) is_open: bool,
+    pub(crate) budget: &'a mut Budget,
+}
+
+impl<T: Transmit> ProcessContext<'_, T> {
     /// Queues a PDO with present values, which a newer one may replace. `false` when there is no room beside the services,
     /// or the process data have taken their share of the bus.
+    #[inline(always)]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
-        self.room() > ROOM_FOR_SERVICES && self.admits(&frame) && self.send_state(frame) && self.spend(&frame)
+        let len = frame.len();
+        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(&frame, self.now);
+        is_admitted && self.out.send_state(frame).is_ok() && self.spend(len)
     }
 
     /// Queues a multiplexed PDO. `false` when there is no room beside all others, or no share of the bus is left.
     pub(crate) fn send_multiplexed(&mut self, frame: Frame) -> bool {
-        self.has_room_for_event() && self.admits(&frame) && self.send(frame) && self.spend(&frame)
+        self.has_room_for_event() && self.budget.admits(&frame, self.now) && self.send_event(frame)
     }
 
     /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it. `false` when there is
     /// no room beside all others.
     pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
-        self.has_room_for_event() && self.send(frame) && self.spend(&frame)
+        let len = frame.len();
+        self.has_room_for_event() && self.out.send(frame).is_ok() && self.spend(len)
     }
 
     /// Whether `send_event` would take a frame now.
@@ -96,20 +113,12 @@ impl<T: Transmit> Context<'_, T> {
         self.room() > ROOM_FOR_OTHERS
     }
 
-    fn admits(&mut self, frame: &Frame) -> bool {
-        let now = self.now;
-        self.budget.as_mut().is_none_or(|budget| budget.admits(frame.id(), frame.len(), now))
-    }
-
-    fn spend(&mut self, frame: &Frame) -> bool {
-        if let Some(budget) = &mut self.budget {
-            budget.spend(frame.len());
-        }
+    fn spend(&mut self, len: usize) -> bool {
+        self.budget.spend(len);
         true
     }
 
-    /// How many frames `send` would take now.
-    pub(crate) fn room(&self) -> usize {
+    fn room(&self) -> usize {
         if self.is_open { self.out.room() } else { 0 }
     }
 }

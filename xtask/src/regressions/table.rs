@@ -57,9 +57,9 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "heartbeat-late",
         scenario: "starving::a_tpdo_every_millisecond_leaves_room_at_every_bit_rate",
         edits: &[Edit {
-            file: "crates/canopen/src/transmit.rs",
-            mended: "budget.admits(frame.id(), frame.len(), now))",
-            fault: "budget.admits(frame.id(), frame.len(), now) || true)",
+            file: "crates/canopen/src/pdo/budget.rs",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
+            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
     Mend {
@@ -67,9 +67,9 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "heartbeat-late",
         scenario: "starving::a_noisy_pressure_without_inhibit_time_leaves_room",
         edits: &[Edit {
-            file: "crates/canopen/src/transmit.rs",
-            mended: "budget.admits(frame.id(), frame.len(), now))",
-            fault: "budget.admits(frame.id(), frame.len(), now) || true)",
+            file: "crates/canopen/src/pdo/budget.rs",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
+            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
     Mend {
@@ -77,9 +77,9 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "heartbeat-late",
         scenario: "starving::three_position_units_of_a_lift_leave_room_by_their_defaults",
         edits: &[Edit {
-            file: "crates/canopen/src/transmit.rs",
-            mended: "budget.admits(frame.id(), frame.len(), now))",
-            fault: "budget.admits(frame.id(), frame.len(), now) || true)",
+            file: "crates/canopen/src/pdo/budget.rs",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
+            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
     Mend {
@@ -87,9 +87,9 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "heartbeat-late",
         scenario: "starving::a_cyclic_timer_of_a_millisecond_leaves_room",
         edits: &[Edit {
-            file: "crates/canopen/src/transmit.rs",
-            mended: "budget.admits(frame.id(), frame.len(), now))",
-            fault: "budget.admits(frame.id(), frame.len(), now) || true)",
+            file: "crates/canopen/src/pdo/budget.rs",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
+            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
         }],
     },
     Mend {
@@ -223,8 +223,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "inhibit::an_inhibit_time_separates_events",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/tpdo.rs",
-            mended: "=> sent + Duration::from_inhibit(self.inhibit),",
-            fault: "=> sent + Duration::from_inhibit(self.inhibit / 2),",
+            mended: "=> sent.plus(Duration::from_inhibit(self.inhibit)),",
+            fault: "=> sent.plus(Duration::from_inhibit(self.inhibit / 2)),",
         }],
     },
     Mend {

@@ -6,7 +6,7 @@ use crate::dictionary::{Dictionary, Entry};
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::transmit::Context;
+use crate::transmit::{Context, ProcessContext};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// A device without its services. The default of every method is the behaviour of the inner device; the outer device
@@ -57,10 +57,10 @@ pub trait Body: Sized {
     fn configure(&mut self, _now: Instant) {}
 
     /// Takes a frame that is neither NMT nor for the services. Called in states with PDOs only.
-    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut Context<'_, impl Transmit>) {}
+    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut ProcessContext<'_, impl Transmit>) {}
 
     /// Sends the process data that is due.
-    fn send_process(&mut self, _turn: &mut Context<'_, impl Transmit>) {
+    fn send_process(&mut self, _turn: &mut ProcessContext<'_, impl Transmit>) {
         self.basic_mut().process_due = Instant::NEVER;
     }
 

@@ -10,7 +10,7 @@ use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
 use crate::sdo::Abort;
-use crate::transmit::Context;
+use crate::transmit::{Context, ProcessContext};
 use crate::{CanId, Frame, Instant, NodeId, Transmit, emcy, heartbeat, sync};
 
 /// A complete device without its services. The parameters are those of [`Device`](super::Device).
@@ -123,11 +123,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    fn on_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+    fn on_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         self.take_pdo_frame(frame, context);
     }
 
-    fn send_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+    fn send_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
         if context.now >= self.basic.process_due {
             self.run_process(context);
         }

@@ -77,7 +77,7 @@ impl LssSlave {
             }
             Outcome::Switch(switch) => {
                 self.switching = Switching::Before(switch);
-                self.switching_due = context.now + switch.delay();
+                self.switching_due = context.now.plus(switch.delay());
                 None
             }
             // The response is sent at the end of the job.
@@ -99,7 +99,7 @@ impl LssSlave {
     #[inline(never)]
     fn send(&mut self, context: &mut Context<'_, impl Transmit>) {
         let is_sent = context.send(Frame::data_frame(RESPONSE, 8, self.reply));
-        self.reply_due = if is_sent { Instant::NEVER } else { context.now + RETRY };
+        self.reply_due = if is_sent { Instant::NEVER } else { context.now.plus(RETRY) };
     }
 
     /// Sends the response again that found the queue full.
@@ -120,7 +120,7 @@ impl LssSlave {
             return None;
         };
         body.basic_mut().ask(Action::BitRate(switch.bit_rate));
-        (self.switching, self.switching_due) = (Switching::After, now + switch.delay());
+        (self.switching, self.switching_due) = (Switching::After, now.plus(switch.delay()));
         Some(switch.bit_rate)
     }
 

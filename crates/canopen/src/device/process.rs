@@ -5,7 +5,7 @@ use super::full::Full;
 use super::{Application, Device, Next, Node, STALE};
 use crate::nmt::Command;
 use crate::pdo::{Chain, Rpdo, Tpdo};
-use crate::transmit::Context;
+use crate::transmit::ProcessContext;
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 impl<B: Body> Node<B> {
@@ -131,7 +131,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Full<A, N, T, R, W, M>
 {
-    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         if self.sync.accepts(frame) {
             self.on_sync(frame, context);
         } else if frame.is_remote() {
@@ -158,7 +158,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     #[inline(never)]
-    pub(super) fn run_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+    pub(super) fn run_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
         self.poll_sync(context.now);
         let mut due = self.poll_rpdos(context.now);
         self.each_tpdo(Chain::Valid, |tpdo, image| {
@@ -170,6 +170,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let due = due.min(self.scanner.due()).min(self.sync.due());
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
         debug_assert!(due > context.now, "process data are still due after a poll");
-        self.basic.process_due = due.max(context.now + Duration(1));
+        self.basic.process_due = due.max(context.now.plus(Duration(1)));
     }
 }

@@ -7,7 +7,7 @@ use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::pdo::Budget;
 use crate::sdo::{Abort, Server};
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{Context, ProcessContext, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
@@ -75,7 +75,7 @@ impl Services {
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
     pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching(), budget: None }
+        Context { now, out, is_open: !self.lss.is_switching() }
     }
 
     /// The same for process data, which have a share of the bus.
@@ -83,8 +83,8 @@ impl Services {
         &'a mut self,
         now: Instant,
         out: &'a mut Q,
-    ) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching(), budget: Some(&mut self.budget) }
+    ) -> ProcessContext<'a, Q> {
+        ProcessContext { now, out, is_open: !self.lss.is_switching(), budget: &mut self.budget }
     }
 }
 
@@ -170,7 +170,7 @@ impl<B: Body> Node<B> {
         let has_reply = server.send_block(&self.body, context.now, |data| {
             context.room() > B::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
-        let block_due = if server.is_sending() { context.now + RETRY } else { Instant::NEVER };
+        let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Instant::NEVER };
         self.services.block_due = block_due;
         self.body.basic_mut().serve_until(block_due);
         if has_reply {
@@ -186,7 +186,7 @@ impl<B: Body> Node<B> {
         if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
             self.services.reply_due = Instant::NEVER;
         } else {
-            self.services.reply_due = context.now + RETRY;
+            self.services.reply_due = context.now.plus(RETRY);
             basic.serve_until(self.services.reply_due);
         }
     }

@@ -7,7 +7,7 @@ use super::pdos::low_half;
 use super::{Action, Application, Job, Next, Node, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
-use crate::transmit::Context;
+use crate::transmit::ProcessContext;
 use crate::{Instant, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.
@@ -230,7 +230,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
-    pub(super) fn self_start(&mut self, context: &mut Context<'_, impl Transmit>) {
+    pub(super) fn self_start(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
         let next_state = &mut self.basic.pending.next_state;
         if next_state.take_if(|state| *state == State::Operational).is_some() && self.emcy.register() == 0 {
             self.enter(State::Operational);

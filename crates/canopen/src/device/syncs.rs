@@ -6,7 +6,7 @@ use super::{Application, STALE};
 use crate::emcy::Fault;
 use crate::pdo::Chain;
 use crate::sync::Settings;
-use crate::transmit::Context;
+use crate::transmit::ProcessContext;
 use crate::{Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
@@ -23,7 +23,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.clear(Fault::SyncMissing, now);
     }
 
-    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         let Ok(sync) = self.sync.take(frame, context.now) else {
             return self.report(Fault::SyncLength, context.now);
         };

@@ -68,7 +68,7 @@ impl Producer {
 
     /// When the next message may be sent.
     fn next_due(&self, now: Instant) -> Instant {
-        let inhibited = self.sent_at.map(|sent| sent + Duration::from_inhibit(self.inhibit));
+        let inhibited = self.sent_at.map(|sent| sent.plus(Duration::from_inhibit(self.inhibit)));
         inhibited.map_or(now, |end| end.max(now))
     }
 
@@ -177,7 +177,7 @@ impl Producer {
         let Some(cob_id) = self.id else { return self.forget_waiting() };
         while let Some(message) = self.waiting.front() {
             if !context.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
-                self.due = context.now + RETRY;
+                self.due = context.now.plus(RETRY);
                 return;
             }
             if message.code != 0 {

@@ -76,7 +76,7 @@ impl<const W: usize> Consumer<W> {
         }
         for (number, entry) in (0..).zip(&mut self.entries) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
-                entry.due = now + Duration::from_millis(watch.period.into());
+                entry.due = now.plus(Duration::from_millis(watch.period.into()));
                 return core::mem::take(&mut entry.is_lost).then_some(Change::Back(number));
             }
         }

@@ -46,7 +46,7 @@ impl Producer {
         match self.due {
             _ if self.boot_up => Instant(0),
             Instant::NEVER => Instant::NEVER,
-            due => due + Duration::from_millis(u64::from(self.period) / 2),
+            due => due.plus(Duration::from_millis(u64::from(self.period) / 2)),
         }
     }
 
@@ -62,7 +62,7 @@ impl Producer {
             context.send_state(message(state))
         };
         if !sent {
-            self.due = context.now + RETRY;
+            self.due = context.now.plus(RETRY);
             return;
         }
         self.boot_up = false;
@@ -75,7 +75,7 @@ impl Producer {
             return Instant::NEVER;
         }
         let period = Duration::from_millis(self.period.into());
-        let next = self.due + period;
-        if next > now { next } else { now + period }
+        let next = self.due.plus(period);
+        if next > now { next } else { now.plus(period) }
     }
 }

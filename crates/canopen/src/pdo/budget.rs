@@ -6,80 +6,82 @@
 //! values. The longest waiting PDO has the first claim, so no PDO starves another one.
 
 use crate::transmit::RETRY;
-use crate::{Duration, Instant};
+use crate::{Duration, Frame, Instant};
 
 /// The share: `SHARE` / 4 of the bus.
-const SHARE: u64 = 3;
-/// Time over which credit accumulates.
-const WINDOW: Duration = Duration::from_millis(250);
+const SHARE: u32 = 3;
+/// Time over which credit accumulates, in microseconds.
+const WINDOW: u32 = 250_000;
 /// A claim that is not renewed has ended: a waiting PDO tries again each millisecond.
 const CLAIM: Duration = Duration(3 * RETRY.0);
+
+/// Credit that is enough for any PDO; a power of two, which one instruction compares.
+const ENOUGH: u32 = 1 << 18;
+const _: () = assert!(ENOUGH > cost(8), "the longest PDO costs less");
 
 /// Credit for process data, in thousandths of a bit.
 #[derive(Debug)]
 pub(crate) struct Budget {
     /// The bit rate in kbit/s: bits a millisecond.
     kbit: u16,
+    /// The CAN-ID of the PDO with the first claim.
+    claimant: u16,
+    /// The end of the claim. Until then only the claimant earns credit, so the credit is short for all others.
+    claim_end: Instant,
     credit: u32,
     refilled: Instant,
-    /// The CAN-ID of the PDO with the first claim, and the end of the claim.
-    claim: Option<(u16, Instant)>,
 }
 
 impl Budget {
     /// A full budget.
     pub(crate) const fn new(kbit: u16) -> Budget {
-        Budget { kbit, credit: limit(kbit), refilled: Instant(0), claim: None }
+        Budget {
+            kbit,
+            claimant: 0,
+            claim_end: Instant(0),
+            credit: limit(kbit),
+            refilled: Instant(0),
+        }
     }
 
     /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.
     pub(crate) fn set_bit_rate(&mut self, kbit: u16) {
-        self.kbit = kbit;
-        self.credit = limit(kbit);
-        self.claim = None;
+        (self.kbit, self.credit, self.claim_end) = (kbit, limit(kbit), Instant(0));
     }
 
-    /// Whether the PDO with this CAN-ID and number of bytes may be sent now.
-    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Instant) -> bool {
-        let cost = cost(len);
-        if self.claim.is_none() && self.credit >= cost || self.kbit == 0 {
-            return true;
-        }
-        self.admits_with_refill(id, cost, now)
+    /// Whether a PDO may be sent now.
+    #[inline]
+    pub(crate) fn admits(&mut self, frame: &Frame, now: Instant) -> bool {
+        self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)
     }
 
     #[inline(never)]
-    fn admits_with_refill(&mut self, id: u16, cost: u32, now: Instant) -> bool {
+    fn admits_scarce(&mut self, id: u16, len: usize, now: Instant) -> bool {
+        if self.claimant != id && self.claim_end > now {
+            return false;
+        }
         self.refill(now);
-        let other = self.claim.filter(|(other, until)| *other != id && *until > now);
-        if self.credit >= cost && other.is_none() {
-            self.claim = None;
-            return true;
-        }
-        if other.is_none() {
-            self.claim = Some((id, now + CLAIM));
-        }
-        false
+        let is_admitted = self.credit >= cost(len) || self.kbit == 0;
+        self.claimant = id;
+        self.claim_end = if is_admitted { Instant(0) } else { now.plus(CLAIM) };
+        is_admitted
     }
 
-    /// A frame with this number of bytes has been queued.
+    /// A PDO with this number of bytes has been queued.
     pub(crate) fn spend(&mut self, len: usize) {
         self.credit = self.credit.saturating_sub(cost(len));
     }
 
     fn refill(&mut self, now: Instant) {
-        let elapsed = now.0.saturating_sub(self.refilled.0).min(WINDOW.0);
-        let earned = elapsed * u64::from(self.kbit) * SHARE / 4;
-        let earned = u32::try_from(earned).unwrap_or(u32::MAX);
-        (self.credit, self.refilled) = (self.credit.saturating_add(earned).min(limit(self.kbit)), now);
+        let elapsed = u32::try_from(now.0 - self.refilled.0).unwrap_or(WINDOW).min(WINDOW);
+        let earned = elapsed * u32::from(self.kbit) * SHARE / 4;
+        (self.credit, self.refilled) = ((self.credit + earned).min(limit(self.kbit)), now);
     }
 }
 
 /// The most credit that accumulates.
 const fn limit(kbit: u16) -> u32 {
-    #[allow(clippy::cast_possible_truncation, reason = "below 2^32 for every u16")]
-    let limit = (WINDOW.0 / 1000 * kbit as u64 * SHARE / 4) as u32;
-    limit.saturating_mul(1000)
+    WINDOW * SHARE / 4 * kbit as u32
 }
 
 /// The longest frame with this number of bytes, with stuff bits and the space after it: 55 bits and ten for each byte.
@@ -95,13 +97,17 @@ mod tests {
 
     const RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
+    fn pdo(id: u16) -> Frame {
+        Frame::new(id, &[0; 8]).unwrap()
+    }
+
     /// Eight PDOs of eight bytes that are due at every millisecond: the frames of each in ten seconds.
     fn frames_of_eight(kbit: u16) -> [u32; 8] {
         let mut budget = Budget::new(kbit);
         let mut frames = [0; 8];
         for ms in 0..10_000 {
             for (id, count) in (0x181..).zip(&mut frames) {
-                if budget.admits(id, 8, Instant(ms * 1000)) {
+                if budget.admits(&pdo(id), Instant(ms * 1000)) {
                     budget.spend(8);
                     *count += 1;
                 }
@@ -133,10 +139,10 @@ mod tests {
     #[test]
     fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Instant(0)) {
+        while budget.admits(&pdo(0x181), Instant(0)) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x281, 8, Instant(2_000)), "181h has the claim");
-        assert!(budget.admits(0x281, 8, Instant(40_000)), "the claim of 181h has ended");
+        assert!(!budget.admits(&pdo(0x281), Instant(2_000)), "181h has the claim");
+        assert!(budget.admits(&pdo(0x281), Instant(40_000)), "the claim of 181h has ended");
     }
 }

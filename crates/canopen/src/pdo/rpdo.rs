@@ -147,7 +147,7 @@ impl Rpdo {
         }
         self.due = match settings.deadline {
             0 => Instant::NEVER,
-            deadline => now + Duration::from_millis(deadline.into()),
+            deadline => now.plus(Duration::from_millis(deadline.into())),
         };
         let reception = if frame.len() == mapped { Reception::Complete } else { Reception::TooLong };
         match (&settings.content, settings.is_synchronous) {

@@ -8,7 +8,7 @@
 use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
 use crate::sdo::Multiplexer;
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{ProcessContext, RETRY};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
@@ -162,7 +162,7 @@ impl<const M: usize> Scanner<M> {
 
     fn inhibit_end(&self) -> Instant {
         match (self.sent, self.settings) {
-            (Some(sent), Some(settings)) => sent + Duration::from_inhibit(settings.inhibit),
+            (Some(sent), Some(settings)) => sent.plus(Duration::from_inhibit(settings.inhibit)),
             _ => Instant(0),
         }
     }
@@ -173,7 +173,7 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects whose value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
             for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
@@ -185,14 +185,14 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Some(settings) = self.settings else { return };
         let elapsed = context.now >= self.event_due;
         if elapsed {
             self.send_all();
         }
         if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {
-            self.event_due = context.now + Duration::from_millis(settings.event.into());
+            self.event_due = context.now.plus(Duration::from_millis(settings.event.into()));
         }
         if !self.is_pending {
             return;
@@ -205,13 +205,13 @@ impl<const M: usize> Scanner<M> {
             // All these frames have the same identifier but different objects: no frame may replace another in the
             // queue.
             if !context.send_multiplexed(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
-                self.inhibited_until = context.now + RETRY;
+                self.inhibited_until = context.now.plus(RETRY);
                 return;
             }
             (watched.sent, watched.is_pending) = (Some(data), false);
             self.sent = Some(context.now);
             if settings.inhibit != 0 {
-                self.inhibited_until = context.now + Duration::from_inhibit(settings.inhibit);
+                self.inhibited_until = context.now.plus(Duration::from_inhibit(settings.inhibit));
             }
         }
         self.is_pending = false;

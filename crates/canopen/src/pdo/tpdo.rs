@@ -9,7 +9,7 @@
 
 use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{ProcessContext, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
@@ -44,9 +44,10 @@ impl Settings {
     };
 
     /// The end of the inhibit time after a transmission. The types 254 and 255 have an inhibit time (CiA 301, 7.5.2.35).
-    fn inhibit_end(&self, sent: Option<Instant>) -> Instant {
+    fn inhibit_end(&self, sent: Instant) -> Instant {
         match sent {
-            Some(sent) if self.transmission.is_event_driven() => sent + Duration::from_inhibit(self.inhibit),
+            Instant::NEVER => Instant(0),
+            _ if self.transmission.is_event_driven() => sent.plus(Duration::from_inhibit(self.inhibit)),
             _ => Instant(0),
         }
     }
@@ -74,8 +75,8 @@ pub(crate) struct Tpdo {
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
     event_due: Instant,
-    /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
-    sent: Option<Instant>,
+    /// The last transmission since the last reset, or `NEVER`. No reconfiguration shortens the inhibit time.
+    sent: Instant,
     /// The end of the inhibit time; earlier, a transmission waits.
     inhibited_until: Instant,
     /// When to ask the application for events. Used only for a TPDO that sends events.
@@ -110,7 +111,7 @@ impl Tpdo {
             is_counting: false,
             data: None,
             event_due: Instant::NEVER,
-            sent: None,
+            sent: Instant::NEVER,
             inhibited_until: Instant(0),
             events: Events::NONE,
         }
@@ -147,7 +148,7 @@ impl Tpdo {
     }
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
+    pub(crate) fn asks_for_event(&mut self, context: &ProcessContext<'_, impl Transmit>) -> Option<u16> {
         let number = self.events_of()?;
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
@@ -155,7 +156,7 @@ impl Tpdo {
             && !self.pending
             && context.now >= self.inhibited_until;
         if is_asked_now && !context.has_room_for_event() {
-            (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
+            (self.events.may_wait, self.inhibited_until) = (true, context.now.plus(RETRY));
             return None;
         }
         is_asked_now.then_some(number)
@@ -166,7 +167,7 @@ impl Tpdo {
         &mut self,
         is_event: bool,
         image: &[u8],
-        context: &mut Context<'_, impl Transmit>,
+        context: &mut ProcessContext<'_, impl Transmit>,
     ) {
         if is_event || self.events.is_silent && self.data.is_some() {
             self.send(image, context);
@@ -193,7 +194,7 @@ impl Tpdo {
 
     /// Ends the inhibit time, at a reset.
     pub(crate) fn reset(&mut self) {
-        self.sent = None;
+        self.sent = Instant::NEVER;
         self.stop();
     }
 
@@ -203,7 +204,7 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let transmission = self.settings.transmission;
         match transmission {
             Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
@@ -237,7 +238,8 @@ impl Tpdo {
 
     /// Answers a remote frame; the types 254 and 255 answer when the inhibit time is over. TPDOs of the synchronous types
     /// 0 to 240 are sent by SYNC only and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    #[inline(never)]
+    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
             return;
@@ -263,7 +265,7 @@ impl Tpdo {
     }
 
     /// Sends the values if a mapped value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         if self.settings.sends_on_change() && self.has_changed(image) {
             self.pending = true;
             self.poll(image, context);
@@ -284,7 +286,7 @@ impl Tpdo {
     }
 
     /// Sends the TPDO if a transmission is due.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let elapsed = context.now >= self.event_due;
         let sends_events = self.events_of().is_some();
         if elapsed || sends_events && self.event_due == Instant::NEVER {
@@ -306,28 +308,37 @@ impl Tpdo {
             return Instant::NEVER;
         }
         let period = Duration::from_millis(self.settings.event.into());
-        let next = self.event_due + period;
-        if self.event_due != Instant::NEVER && next > now { next } else { now + period }
+        let last = if self.event_due == Instant::NEVER { now } else { self.event_due };
+        let next = last.plus(period);
+        if next > now { next } else { now.plus(period) }
     }
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
-    fn send(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    fn send(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Settings { id, layout, transmission, .. } = &self.settings;
         let data = layout.gather(image);
-        let frame = Frame::data_frame(*id, layout.len(), data);
+        let frame = || Frame::data_frame(*id, layout.len(), data);
         let sends_events = self.settings.events_of.is_some();
-        let is_sent = if sends_events { context.send_event(frame) } else { context.send_pdo(frame) };
+        let is_sent = if sends_events { context.send_event(frame()) } else { context.send_pdo(frame()) };
         self.pending = !is_sent;
         if is_sent {
-            (self.data, self.sent) = (Some(data), Some(context.now));
-            if self.settings.inhibit != 0 {
-                self.inhibited_until = self.settings.inhibit_end(self.sent);
-            }
+            (self.data, self.sent) = (Some(data), context.now);
         } else {
-            self.inhibited_until = context.now + RETRY;
+            self.inhibited_until = context.now.plus(RETRY);
         }
-        if transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(context.now);
+        if transmission.is_event_driven() {
+            self.restart_timers(context.now);
+        }
+    }
+
+    /// A TPDO of type 254 or 255 has been sent, or has to wait.
+    #[inline(never)]
+    fn restart_timers(&mut self, now: Instant) {
+        if !self.pending && self.settings.inhibit != 0 {
+            self.inhibited_until = self.settings.inhibit_end(self.sent);
+        }
+        if self.event_due == Instant::NEVER {
+            self.event_due = self.following_event(now);
         }
     }
 }

@@ -87,8 +87,8 @@ impl Server {
     pub(crate) fn deadline(&self) -> Instant {
         match &self.transfer {
             Transfer::Idle => Instant::NEVER,
-            _ if self.is_within_block() => self.active + BLOCK_PAUSE,
-            _ => self.active + TIME_OUT,
+            _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
+            _ => self.active.plus(TIME_OUT),
         }
     }
 
@@ -198,7 +198,7 @@ impl Server {
         }
         match &mut self.transfer {
             Transfer::BlockDownload(receiver)
-                if receiver.is_within_block() && now < self.active + TIME_OUT =>
+                if receiver.is_within_block() && now < self.active.plus(TIME_OUT) =>
             {
                 let sequence = receiver.acknowledge();
                 self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
