@@ -92,25 +92,20 @@ impl<T: Transmit> ProcessContext<'_, T> {
     #[inline(always)]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
         let len = frame.len();
-        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(&frame, self.now);
+        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(frame.id(), len, self.now);
         is_admitted && self.out.send_state(frame).is_ok() && self.spend(len)
     }
 
-    /// Queues a multiplexed PDO. `false` when there is no room beside all others, or no share of the bus is left.
-    pub(crate) fn send_multiplexed(&mut self, frame: Frame) -> bool {
-        self.has_room_for_event() && self.budget.admits(&frame, self.now) && self.send_event(frame)
-    }
-
-    /// Queues a PDO with an event, which counts for the share of the bus and is not limited by it. `false` when there is
-    /// no room beside all others.
+    /// Queues a PDO that no newer one may replace: a multiplexed PDO, or one with an event. `false` when there is no room
+    /// beside all others, or the process data have taken their share of the bus.
     pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
         let len = frame.len();
-        self.has_room_for_event() && self.out.send(frame).is_ok() && self.spend(len)
+        self.takes_event(frame.id(), len) && self.out.send(frame).is_ok() && self.spend(len)
     }
 
-    /// Whether `send_event` would take a frame now.
-    pub(crate) fn has_room_for_event(&self) -> bool {
-        self.room() > ROOM_FOR_OTHERS
+    /// Whether `send_event` would take a frame with this CAN-ID and number of bytes now.
+    pub(crate) fn takes_event(&mut self, id: u16, len: usize) -> bool {
+        self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)
     }
 
     fn spend(&mut self, len: usize) -> bool {

@@ -53,3 +53,17 @@ fn a_cyclic_timer_of_a_millisecond_leaves_room() {
     nmt(&mut bus, 1);
     run(&mut bus);
 }
+
+/// Events are no exception: an event timer repeats them.
+#[test]
+fn event_timers_of_a_millisecond_on_all_tpdos_of_a_lift_leave_room() {
+    for kbit in [10, 50, 250] {
+        let mut bus = bus(kbit, Personality::Lift, Motion { noise: 500, ..Motion::default() });
+        write(&mut bus, 1, 0x2305, 0, &[0x0F]);
+        for communication in [0x1801, 0x1881, 0x1901, 0x1906, 0x1907, 0x1980, 0x1981] {
+            write(&mut bus, 1, communication, 5, &1_u16.to_le_bytes());
+        }
+        nmt(&mut bus, 1);
+        run(&mut bus);
+    }
+}

@@ -31,6 +31,11 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "deadlines::button_calls_on_a_busy_bus_leave_all_deadlines_in_the_future",
         edits: &[
             Edit {
+                file: "crates/canopen/src/device/process.rs",
+                mended: "self.basic.process_due = due.max(context.now.plus(Duration(1)));",
+                fault: "self.basic.process_due = due;",
+            },
+            Edit {
                 file: "crates/canopen/src/pdo/tpdo.rs",
                 mended: "        let number = self.events_of()?;\n        let settings = &self.settings;\n        let is_asked_now",
                 fault: "        let settings = &self.settings;\n        let is_asked_now",
@@ -46,11 +51,18 @@ pub(super) const MENDS: &[Mend] = &[
         finding: "K22",
         rule: "deadline",
         scenario: "deadlines::a_deselected_multiplexed_tpdo_has_no_deadline_in_the_past",
-        edits: &[Edit {
-            file: "crates/canopen/src/pdo/scanner.rs",
-            mended: "if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {",
-            fault: "if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {",
-        }],
+        edits: &[
+            Edit {
+                file: "crates/canopen/src/device/process.rs",
+                mended: "self.basic.process_due = due.max(context.now.plus(Duration(1)));",
+                fault: "self.basic.process_due = due;",
+            },
+            Edit {
+                file: "crates/canopen/src/pdo/scanner.rs",
+                mended: "if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {",
+                fault: "if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {",
+            },
+        ],
     },
     Mend {
         finding: "P25",
@@ -58,8 +70,18 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_tpdo_every_millisecond_leaves_room_at_every_bit_rate",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
-            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            fault: "true || self.admits_scarce(id, len, now)",
+        }],
+    },
+    Mend {
+        finding: "P25, events",
+        rule: "heartbeat-late",
+        scenario: "starving::event_timers_of_a_millisecond_on_all_tpdos_of_a_lift_leave_room",
+        edits: &[Edit {
+            file: "crates/canopen/src/transmit.rs",
+            mended: "self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)",
+            fault: "self.room() > ROOM_FOR_OTHERS",
         }],
     },
     Mend {
@@ -68,8 +90,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_noisy_pressure_without_inhibit_time_leaves_room",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
-            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            fault: "true || self.admits_scarce(id, len, now)",
         }],
     },
     Mend {
@@ -78,8 +100,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::three_position_units_of_a_lift_leave_room_by_their_defaults",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
-            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            fault: "true || self.admits_scarce(id, len, now)",
         }],
     },
     Mend {
@@ -88,8 +110,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_cyclic_timer_of_a_millisecond_leaves_room",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)",
-            fault: "true || self.admits_scarce(frame.id(), frame.len(), now)",
+            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            fault: "true || self.admits_scarce(id, len, now)",
         }],
     },
     Mend {

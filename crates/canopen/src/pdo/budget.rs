@@ -6,7 +6,7 @@
 //! values. The longest waiting PDO has the first claim, so no PDO starves another one.
 
 use crate::transmit::RETRY;
-use crate::{Duration, Frame, Instant};
+use crate::{Duration, Instant};
 
 /// The share: `SHARE` / 4 of the bus.
 const SHARE: u32 = 3;
@@ -35,13 +35,7 @@ pub(crate) struct Budget {
 impl Budget {
     /// A full budget.
     pub(crate) const fn new(kbit: u16) -> Budget {
-        Budget {
-            kbit,
-            claimant: 0,
-            claim_end: Instant(0),
-            credit: limit(kbit),
-            refilled: Instant(0),
-        }
+        Budget { kbit, claimant: 0, claim_end: Instant(0), credit: limit(kbit), refilled: Instant(0) }
     }
 
     /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.
@@ -49,10 +43,10 @@ impl Budget {
         (self.kbit, self.credit, self.claim_end) = (kbit, limit(kbit), Instant(0));
     }
 
-    /// Whether a PDO may be sent now.
+    /// Whether the PDO with this CAN-ID and number of bytes may be sent now.
     #[inline]
-    pub(crate) fn admits(&mut self, frame: &Frame, now: Instant) -> bool {
-        self.credit >= ENOUGH || self.admits_scarce(frame.id(), frame.len(), now)
+    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Instant) -> bool {
+        self.credit >= ENOUGH || self.admits_scarce(id, len, now)
     }
 
     #[inline(never)]
@@ -97,17 +91,13 @@ mod tests {
 
     const RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
-    fn pdo(id: u16) -> Frame {
-        Frame::new(id, &[0; 8]).unwrap()
-    }
-
     /// Eight PDOs of eight bytes that are due at every millisecond: the frames of each in ten seconds.
     fn frames_of_eight(kbit: u16) -> [u32; 8] {
         let mut budget = Budget::new(kbit);
         let mut frames = [0; 8];
         for ms in 0..10_000 {
             for (id, count) in (0x181..).zip(&mut frames) {
-                if budget.admits(&pdo(id), Instant(ms * 1000)) {
+                if budget.admits(id, 8, Instant(ms * 1000)) {
                     budget.spend(8);
                     *count += 1;
                 }
@@ -139,10 +129,10 @@ mod tests {
     #[test]
     fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
         let mut budget = Budget::new(10);
-        while budget.admits(&pdo(0x181), Instant(0)) {
+        while budget.admits(0x181, 8, Instant(0)) {
             budget.spend(8);
         }
-        assert!(!budget.admits(&pdo(0x281), Instant(2_000)), "181h has the claim");
-        assert!(budget.admits(&pdo(0x281), Instant(40_000)), "the claim of 181h has ended");
+        assert!(!budget.admits(0x281, 8, Instant(2_000)), "181h has the claim");
+        assert!(budget.admits(0x281, 8, Instant(40_000)), "the claim of 181h has ended");
     }
 }

@@ -204,7 +204,7 @@ impl<const M: usize> Scanner<M> {
             let data = watched.value(image);
             // All these frames have the same identifier but different objects: no frame may replace another in the
             // queue.
-            if !context.send_multiplexed(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+            if !context.send_event(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
                 self.inhibited_until = context.now.plus(RETRY);
                 return;
             }

@@ -148,14 +148,14 @@ impl Tpdo {
     }
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, context: &ProcessContext<'_, impl Transmit>) -> Option<u16> {
+    pub(crate) fn asks_for_event(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Option<u16> {
         let number = self.events_of()?;
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
             && context.now >= self.inhibited_until;
-        if is_asked_now && !context.has_room_for_event() {
+        if is_asked_now && !context.takes_event(settings.id.get(), settings.layout.len().into()) {
             (self.events.may_wait, self.inhibited_until) = (true, context.now.plus(RETRY));
             return None;
         }
@@ -204,7 +204,12 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(crate) fn on_sync(
+        &mut self,
+        sync: Sync,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit>,
+    ) {
         let transmission = self.settings.transmission;
         match transmission {
             Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
