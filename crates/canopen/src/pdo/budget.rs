@@ -2,16 +2,21 @@
 //!
 //! The CAN-IDs of PDOs are more urgent than those of SDO and heartbeat. A node whose PDOs fill the bus would silence its
 //! own heartbeat and its own SDO server, and no master could correct its settings. PDOs therefore take at most three
-//! quarters of the bus, measured over a quarter of a second. A PDO without credit waits, and is sent with its newest
+//! quarters of the bus, after a burst of a few milliseconds. A PDO without credit waits, and is sent with its newest
 //! values. The longest waiting PDO has the first claim, so no PDO starves another one.
+//!
+//! A burst leaves the bus to the services again after 36 ms and the time of four PDOs at most, 90 ms at 10 kbit/s.
 
 use crate::transmit::RETRY;
 use crate::{Duration, Instant};
 
 /// The share: `SHARE` / 4 of the bus.
 const SHARE: u32 = 3;
-/// Time over which credit accumulates, in microseconds.
-const WINDOW: u32 = 250_000;
+/// A burst: the share of so many microseconds, and a PDO.
+const BURST: u32 = 12_000;
+/// Time in microseconds after which the credit is full at every bit rate.
+const FULL_AFTER: u32 = 50_000;
+const _: () = assert!(limit(10) <= FULL_AFTER * 10 * SHARE / 4, "the credit is full");
 /// A claim that is not renewed has ended: a waiting PDO tries again each millisecond.
 const CLAIM: Duration = Duration(3 * RETRY.0);
 
@@ -67,7 +72,7 @@ impl Budget {
     }
 
     fn refill(&mut self, now: Instant) {
-        let elapsed = u32::try_from(now.0 - self.refilled.0).unwrap_or(WINDOW).min(WINDOW);
+        let elapsed = u32::try_from(now.0 - self.refilled.0).unwrap_or(FULL_AFTER).min(FULL_AFTER);
         let earned = elapsed * u32::from(self.kbit) * SHARE / 4;
         (self.credit, self.refilled) = ((self.credit + earned).min(limit(self.kbit)), now);
     }
@@ -75,7 +80,7 @@ impl Budget {
 
 /// The most credit that accumulates.
 const fn limit(kbit: u16) -> u32 {
-    WINDOW * SHARE / 4 * kbit as u32
+    BURST * SHARE / 4 * kbit as u32 + cost(8)
 }
 
 /// The longest frame with this number of bytes, with stuff bits and the space after it: 55 bits and ten for each byte.
@@ -111,7 +116,7 @@ mod tests {
         for kbit in RATES {
             let bits = frames_of_eight(kbit).iter().sum::<u32>() * 135;
             let seconds = f64::from(bits) / f64::from(kbit) / 1000.0;
-            let may = 0.75 * (10.0 + 0.25);
+            let may = 0.75 * (10.0 + 0.012) + 135.0 / f64::from(kbit) / 1000.0;
             assert!(seconds <= may, "{kbit} kbit/s: {seconds} s of 10 s");
             assert!(seconds > 0.72 * 10.0 || kbit == 1000, "{kbit} kbit/s: {seconds} s of 10 s");
         }
