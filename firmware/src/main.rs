@@ -214,7 +214,10 @@ mod app {
 
     #[task(binds = CAN1_TX, priority = 4, local = [transmitter], shared = [transmit])]
     fn transmit(mut cx: transmit::Context) {
-        cx.shared.transmit.lock(|queue| queue.pump(cx.local.transmitter));
+        // One frame at a time: a task of the same or a higher priority waits for one frame at most.
+        if cx.shared.transmit.lock(|queue| queue.step(cx.local.transmitter)) {
+            rtic::pend(TRANSMIT);
+        }
     }
 
     #[task(binds = TIM2, priority = 3, local = [time, process],

@@ -81,22 +81,27 @@ impl TransmitQueue {
 
     /// Moves frames into the mailboxes until they take no more.
     pub fn pump(&mut self, mailboxes: &mut impl Mailboxes) {
+        while self.step(mailboxes) {}
+    }
+
+    /// Moves one frame into a mailbox. Returns whether the mailboxes may take another one now.
+    pub fn step(&mut self, mailboxes: &mut impl Mailboxes) -> bool {
         mailboxes.settle(core::mem::take(&mut self.is_cleared));
-        while let Some(frame) = self.next(mailboxes) {
-            let offer = mailboxes.offer(&frame);
-            if offer == Offer::Refused {
-                return;
-            }
-            if matches!(self.boot_up, BootUp::Waits(_)) {
-                self.boot_up = BootUp::InMailbox;
-            } else {
-                self.waiting.pop();
-            }
-            if let Offer::Replaced(other) = offer {
-                // The frame just removed has left room for this one.
-                let _ = self.push_first(other);
-            }
+        let Some(frame) = self.next(mailboxes) else { return false };
+        let offer = mailboxes.offer(&frame);
+        if offer == Offer::Refused {
+            return false;
         }
+        if matches!(self.boot_up, BootUp::Waits(_)) {
+            self.boot_up = BootUp::InMailbox;
+        } else {
+            self.waiting.pop();
+        }
+        if let Offer::Replaced(other) = offer {
+            // The frame just removed has left room for this one.
+            let _ = self.push_first(other);
+        }
+        !self.waiting.is_empty()
     }
 
     /// The next frame for a mailbox. The boot-up message has all mailboxes for itself.
