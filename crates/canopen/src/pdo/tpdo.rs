@@ -192,10 +192,9 @@ impl Tpdo {
         self.events = Events::NONE;
     }
 
-    /// Ends the inhibit time, at a reset.
-    pub(crate) fn reset(&mut self) {
+    /// At a reset: the inhibit time does not outlast the next `stop`.
+    pub(crate) fn forget_sent(&mut self) {
         self.sent = Instant::NEVER;
-        self.stop();
     }
 
     /// When the next transmission or the event timer is due.
