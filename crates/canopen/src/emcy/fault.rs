@@ -197,14 +197,11 @@ impl FaultSet {
     /// The active faults, without those of heartbeats and RPDOs.
     pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
         (0..Fault::SINGLE.len() + 32).filter_map(move |place| {
-            let (fault, is_active) = match Fault::SINGLE.get(place) {
-                Some(fault) => (*fault, self.single & 1 << place != 0),
-                None => {
-                    let number = u8::try_from(place - Fault::SINGLE.len()).unwrap_or(u8::MAX);
-                    (Fault::Application(number), self.application & application_bit(number) != 0)
-                }
-            };
-            is_active.then_some(fault)
+            if let Some(fault) = Fault::SINGLE.get(place) {
+                return (self.single & 1 << place != 0).then_some(*fault);
+            }
+            let number = u8::try_from(place - Fault::SINGLE.len()).unwrap_or(u8::MAX);
+            (self.application & application_bit(number) != 0).then_some(Fault::Application(number))
         })
     }
 

@@ -35,13 +35,7 @@ pub(crate) struct Budget {
 impl Budget {
     /// A full budget.
     pub(crate) const fn new(kbit: u16) -> Budget {
-        Budget {
-            kbit,
-            claimant: 0,
-            claim_end: Instant(0),
-            credit: limit(kbit),
-            refilled: Instant(0),
-        }
+        Budget { kbit, claimant: 0, claim_end: Instant(0), credit: limit(kbit), refilled: Instant(0) }
     }
 
     /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.

@@ -203,7 +203,12 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(crate) fn on_sync(
+        &mut self,
+        sync: Sync,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit>,
+    ) {
         let transmission = self.settings.transmission;
         match transmission {
             Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
