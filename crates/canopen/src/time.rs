@@ -43,6 +43,19 @@ impl Instant {
     pub(crate) const fn plus(self, span: Duration) -> Instant {
         Instant(self.0 + span.0)
     }
+
+    /// The next due instant of a timer with a period in milliseconds, 0 for none. It is one period after this due
+    /// instant, so that delays do not add up; after a long gap, or for a timer that starts, one period from now.
+    #[inline(never)]
+    pub(crate) fn following(self, period: u16, now: Instant) -> Instant {
+        if period == 0 {
+            return Instant::NEVER;
+        }
+        let period = Duration::from_millis(period.into());
+        let last = if self == Instant::NEVER { now } else { self };
+        let next = last.plus(period);
+        if next > now { next } else { now.plus(period) }
+    }
 }
 
 impl Add<Duration> for Instant {

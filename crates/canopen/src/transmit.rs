@@ -89,7 +89,7 @@ pub struct ProcessContext<'a, T> {
 impl<T: Transmit> ProcessContext<'_, T> {
     /// Queues a PDO with present values, which a newer one may replace. `false` when there is no room beside the services,
     /// or the process data have taken their share of the bus.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
         let len = frame.len();
         let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(frame.id(), len, self.now);

@@ -212,8 +212,8 @@ pub(super) const MENDS: &[Mend] = &[
         edits: &[
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
-                mended: "            let condition = fault.condition(self.conditions);\n            self.report(condition.code, condition.detail, now);",
-                fault: "            let condition = fault.condition(self.conditions);\n            self.history.push(condition.code);\n            self.report(condition.code, condition.detail, now);",
+                mended: "            self.errors |= self.repeat(fault, now);\n        }\n        is_new",
+                fault: "            self.history.push(fault.condition(self.conditions).code);\n            self.errors |= self.repeat(fault, now);\n        }\n        is_new",
             },
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",

@@ -75,7 +75,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Stopped has no EMCY. A node that has to stop is therefore Pre-operational until its EMCYs are sent; after
     /// bus-off, that is after the recovery.
     pub(super) fn react(&mut self) {
-        for class in self.emcy.take_errors() {
+        while let Some(class) = self.emcy.take_error() {
             self.basic.application.error(class, &mut self.basic.image);
             let ErrorClass(sub) = class;
             let behaviour = self.basic().number(ERROR_BEHAVIOUR, sub);
@@ -99,10 +99,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.emcy.forget_waiting();
         self.emcy.repeat_singles(now);
         for number in self.watches.lost() {
-            self.emcy.repeat(Fault::Heartbeat(number), now);
+            let _ = self.emcy.repeat(Fault::Heartbeat(number), now);
         }
-        for rpdo in &self.rpdos {
-            rpdo.active().for_each(|fault| self.emcy.repeat(fault, now));
+        for fault in self.rpdos.iter().flat_map(crate::pdo::Rpdo::active) {
+            let _ = self.emcy.repeat(fault, now);
         }
         self.basic.services_due = STALE;
     }

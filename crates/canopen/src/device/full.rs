@@ -88,19 +88,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.sync.stop();
         for place in 0..T {
             if let Some(tpdo) = self.tpdos.get_mut(place) {
+                if state == State::Initialising {
+                    tpdo.forget_sent();
+                }
                 if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
             }
             self.begin_events(place);
+        }
+        if state == State::Initialising {
+            self.scanner.forget_sent();
         }
         self.rpdos.iter_mut().for_each(Rpdo::stop);
         if state.has_pdos() {
             self.scanner.start();
         } else {
             self.scanner.stop();
-        }
-        if state == State::Initialising {
-            self.tpdos.iter_mut().for_each(Tpdo::reset);
-            self.scanner.reset();
         }
         self.basic.process_due = STALE;
     }

@@ -196,9 +196,13 @@ impl FaultSet {
 
     /// The active faults, without those of heartbeats and RPDOs.
     pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
-        let single = (0..).zip(Fault::SINGLE).filter(move |(bit, _)| self.single & 1 << bit != 0);
-        let application = (0..32).filter(move |number| self.application & application_bit(*number) != 0);
-        single.map(|(_, fault): (u16, Fault)| fault).chain(application.map(Fault::Application))
+        (0..Fault::SINGLE.len() + 32).filter_map(move |place| {
+            if let Some(fault) = Fault::SINGLE.get(place) {
+                return (self.single & 1 << place != 0).then_some(*fault);
+            }
+            let number = u8::try_from(place - Fault::SINGLE.len()).unwrap_or(u8::MAX);
+            (self.application & application_bit(number) != 0).then_some(Fault::Application(number))
+        })
     }
 
     /// The value of the error register (1001h).

@@ -28,10 +28,10 @@ pub(crate) struct Producer {
     waiting: Deque<Message, WAITING>,
     /// 1015h, in 100 us.
     inhibit: u16,
-    /// When the last message was sent.
-    sent_at: Option<Instant>,
+    /// When the last message was sent, or `NEVER`.
+    sent_at: Instant,
     due: Instant,
-    /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_errors`].
+    /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_error`].
     errors: u8,
 }
 
@@ -45,7 +45,7 @@ impl Producer {
             history: History::new(),
             waiting: Deque::new(),
             inhibit: 0,
-            sent_at: None,
+            sent_at: Instant::NEVER,
             due: Instant::NEVER,
             errors: 0,
         }
@@ -67,9 +67,12 @@ impl Producer {
     }
 
     /// When the next message may be sent.
+    #[inline(never)]
     fn next_due(&self, now: Instant) -> Instant {
-        let inhibited = self.sent_at.map(|sent| sent.plus(Duration::from_inhibit(self.inhibit)));
-        inhibited.map_or(now, |end| end.max(now))
+        match self.sent_at {
+            Instant::NEVER => now,
+            sent => sent.plus(Duration::from_inhibit(self.inhibit)).max(now),
+        }
     }
 
     /// After a reset: clears the history, and reports the faults that are still active again.
@@ -78,8 +81,15 @@ impl Producer {
         self.forget_waiting();
         self.errors = 0;
         let active = core::mem::take(&mut self.active);
-        for fault in active.singles() {
-            self.raise(fault, now);
+        self.raise_singles(active, now);
+    }
+
+    // Not inlined: two callers, and much code.
+    #[inline(never)]
+    fn raise_singles(&mut self, faults: FaultSet, now: Instant) {
+        for fault in faults.singles() {
+            self.active.insert(fault);
+            self.errors |= self.repeat(fault, now);
         }
     }
 
@@ -87,35 +97,36 @@ impl Producer {
     pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
-            let condition = fault.condition(self.conditions);
-            self.report(condition.code, condition.detail, now);
-            if let Some(class) = condition.class {
-                self.add_error(class);
-            }
+            self.errors |= self.repeat(fault, now);
         }
         is_new
     }
 
-    /// Reports an active fault again.
-    pub(crate) fn repeat(&mut self, fault: Fault, now: Instant) {
-        let Condition { code, detail, .. } = fault.condition(self.conditions);
+    /// Reports an active fault, and returns the bit of its class.
+    #[inline(never)]
+    pub(crate) fn repeat(&mut self, fault: Fault, now: Instant) -> u8 {
+        let Condition { code, detail, class, .. } = fault.condition(self.conditions);
         self.report(code, detail, now);
+        class.map_or(0, error_bit)
     }
 
-    /// Reports the active faults again, without those of heartbeats and RPDOs.
+    /// Reports the active faults again, without those of heartbeats and RPDOs. They are no new errors.
     pub(crate) fn repeat_singles(&mut self, now: Instant) {
-        self.active.singles().for_each(|fault| self.repeat(fault, now));
+        let errors = self.errors;
+        self.raise_singles(self.active, now);
+        self.errors = errors;
     }
 
     /// Object 1029h is to be applied for an error of this class.
-    pub(crate) fn add_error(&mut self, ErrorClass(sub): ErrorClass) {
-        self.errors |= 1_u8.checked_shl(sub.into()).unwrap_or(0);
+    pub(crate) fn add_error(&mut self, class: ErrorClass) {
+        self.errors |= error_bit(class);
     }
 
-    /// The classes of the errors since the last call.
-    pub(crate) fn take_errors(&mut self) -> impl Iterator<Item = ErrorClass> + use<> {
-        let errors = core::mem::take(&mut self.errors);
-        (0..8).filter(move |sub| errors & 1 << sub != 0).map(ErrorClass)
+    /// The class of an error that has occurred since the last call, if there is one.
+    pub(crate) fn take_error(&mut self) -> Option<ErrorClass> {
+        let lowest = self.errors.trailing_zeros();
+        self.errors &= self.errors.saturating_sub(1);
+        u8::try_from(lowest).ok().filter(|sub| *sub < 8).map(ErrorClass)
     }
 
     /// Discards the waiting messages.
@@ -184,7 +195,7 @@ impl Producer {
                 self.history.push(message.code);
             }
             let _ = self.waiting.pop_front();
-            self.sent_at = Some(context.now);
+            self.sent_at = context.now;
             if self.inhibit != 0 && !self.waiting.is_empty() {
                 self.due = self.next_due(context.now);
                 return;
@@ -192,6 +203,11 @@ impl Producer {
         }
         self.due = Instant::NEVER;
     }
+}
+
+/// The bit of a class in a set of eight; 0 for a class beyond them.
+fn error_bit(ErrorClass(sub): ErrorClass) -> u8 {
+    1_u8.checked_shl(sub.into()).unwrap_or(0)
 }
 
 /// Checks a new value of 1014h: the CAN-ID can change only while EMCY is disabled (bit 31). EMCY that is enabled needs a

@@ -66,16 +66,6 @@ impl Producer {
             return;
         }
         self.boot_up = false;
-        self.due = self.following(context.now);
-    }
-
-    /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
-    fn following(&self, now: Instant) -> Instant {
-        if self.period == 0 {
-            return Instant::NEVER;
-        }
-        let period = Duration::from_millis(self.period.into());
-        let next = self.due.plus(period);
-        if next > now { next } else { now.plus(period) }
+        self.due = self.due.following(self.period, context.now);
     }
 }

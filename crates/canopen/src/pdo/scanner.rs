@@ -70,7 +70,7 @@ pub(crate) struct Scanner<const M: usize> {
     is_pending: bool,
     event_due: Instant,
     /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
-    sent: Option<Instant>,
+    sent: Instant,
     inhibited_until: Instant,
 }
 
@@ -81,7 +81,7 @@ impl<const M: usize> Scanner<M> {
             watched: Vec::new(),
             is_pending: false,
             event_due: Instant::NEVER,
-            sent: None,
+            sent: Instant::NEVER,
             inhibited_until: Instant(0),
         }
     }
@@ -154,16 +154,15 @@ impl<const M: usize> Scanner<M> {
         self.inhibited_until = self.inhibit_end();
     }
 
-    /// Ends the inhibit time, at a reset.
-    pub(crate) fn reset(&mut self) {
-        self.sent = None;
-        self.stop();
+    /// At a reset: the inhibit time does not outlast the next `stop`.
+    pub(crate) fn forget_sent(&mut self) {
+        self.sent = Instant::NEVER;
     }
 
     fn inhibit_end(&self) -> Instant {
-        match (self.sent, self.settings) {
-            (Some(sent), Some(settings)) => sent.plus(Duration::from_inhibit(settings.inhibit)),
-            _ => Instant(0),
+        match (self.sent, &self.settings) {
+            (Instant::NEVER, _) | (_, None) => Instant(0),
+            (sent, Some(settings)) => sent.plus(Duration::from_inhibit(settings.inhibit)),
         }
     }
 
@@ -209,7 +208,7 @@ impl<const M: usize> Scanner<M> {
                 return;
             }
             (watched.sent, watched.is_pending) = (Some(data), false);
-            self.sent = Some(context.now);
+            self.sent = context.now;
             if settings.inhibit != 0 {
                 self.inhibited_until = context.now.plus(Duration::from_inhibit(settings.inhibit));
             }

@@ -192,10 +192,9 @@ impl Tpdo {
         self.events = Events::NONE;
     }
 
-    /// Ends the inhibit time, at a reset.
-    pub(crate) fn reset(&mut self) {
+    /// At a reset: the inhibit time does not outlast the next `stop`.
+    pub(crate) fn forget_sent(&mut self) {
         self.sent = Instant::NEVER;
-        self.stop();
     }
 
     /// When the next transmission or the event timer is due.
@@ -295,7 +294,7 @@ impl Tpdo {
         let elapsed = context.now >= self.event_due;
         let sends_events = self.events_of().is_some();
         if elapsed || sends_events && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(context.now);
+            self.event_due = self.event_due.following(self.settings.event, context.now);
         }
         if !sends_events {
             self.pending |= elapsed;
@@ -305,17 +304,6 @@ impl Tpdo {
         if self.pending && context.now >= self.inhibited_until {
             self.send(image, context);
         }
-    }
-
-    /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
-    fn following_event(&self, now: Instant) -> Instant {
-        if self.settings.event == 0 {
-            return Instant::NEVER;
-        }
-        let period = Duration::from_millis(self.settings.event.into());
-        let last = if self.event_due == Instant::NEVER { now } else { self.event_due };
-        let next = last.plus(period);
-        if next > now { next } else { now.plus(period) }
     }
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
@@ -343,7 +331,7 @@ impl Tpdo {
             self.inhibited_until = self.settings.inhibit_end(self.sent);
         }
         if self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(now);
+            self.event_due = self.event_due.following(self.settings.event, now);
         }
     }
 }

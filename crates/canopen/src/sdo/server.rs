@@ -84,6 +84,8 @@ impl Server {
     }
 
     /// The next deadline of [`expire`](Server::expire).
+    // Not inlined: three callers.
+    #[inline(never)]
     pub(crate) fn deadline(&self) -> Instant {
         match &self.transfer {
             Transfer::Idle => Instant::NEVER,
