@@ -216,7 +216,7 @@ mod app {
     fn transmit(mut cx: transmit::Context) {
         // One frame at a time: a task of the same or a higher priority waits for one frame at most.
         if cx.shared.transmit.lock(|queue| queue.step(cx.local.transmitter)) {
-            rtic::pend(TRANSMIT);
+            rtic::pend(super::TRANSMIT);
         }
     }
 
