@@ -72,7 +72,8 @@ impl Budget {
     }
 
     fn refill(&mut self, now: Instant) {
-        let elapsed = u32::try_from(now.0 - self.refilled.0).unwrap_or(FULL_AFTER).min(FULL_AFTER);
+        let elapsed =
+            u32::try_from(now.0.saturating_sub(self.refilled.0)).unwrap_or(FULL_AFTER).min(FULL_AFTER);
         let earned = elapsed * u32::from(self.kbit) * SHARE / 4;
         (self.credit, self.refilled) = ((self.credit + earned).min(limit(self.kbit)), now);
     }
@@ -129,6 +130,15 @@ mod tests {
             let (least, most) = (frames.iter().min().unwrap(), frames.iter().max().unwrap());
             assert!(least * 2 >= *most, "{kbit} kbit/s: {frames:?}");
         }
+    }
+
+    #[test]
+    fn an_instant_before_the_last_refill_earns_nothing() {
+        let mut budget = Budget::new(10);
+        while budget.admits(&pdo(0x181), Instant(1_000_000)) {
+            budget.spend(8);
+        }
+        assert!(!budget.admits(&pdo(0x181), Instant(999_999)));
     }
 
     #[test]
