@@ -11,12 +11,10 @@ use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample, R
 use storage::{DeviceRecord, Pages, View};
 
 use super::flash::{Flash, PAGE};
-use super::step::{Step, raw};
+use super::step::{LONGEST_QUEUE, Step, raw};
 use super::watch::Watch;
 
 const PAGES: Pages = Pages::new(0, PAGE);
-/// Frames in the transmit queue, as in the firmware.
-const ROOM: usize = 32;
 /// A chip whose temperature sensor is calibrated.
 const CHIP: ChipThermometer = ChipThermometer { offset: 24.6, slope: 444.0 };
 /// The longest erase of a page.
@@ -25,10 +23,11 @@ const ERASE: Duration = Duration::from_millis(500);
 const REQUESTS: usize = 16;
 
 /// A transmit queue with limited space.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Queue {
     waiting: Vec<Frame>,
     is_congested: bool,
+    length: usize,
 }
 
 impl Transmit for Queue {
@@ -41,7 +40,7 @@ impl Transmit for Queue {
     }
 
     fn room(&self) -> usize {
-        ROOM - self.waiting.len()
+        self.length - self.waiting.len()
     }
 }
 
@@ -83,7 +82,7 @@ impl Board {
             measurement: Measurement::new(personality, &PowerOn::default()),
             flash: Flash::erased(),
             memory: None,
-            out: Queue::default(),
+            out: Queue { waiting: vec![], is_congested: false, length: LONGEST_QUEUE },
             now: Instant(0),
             due: Instant(0),
             filters: [vec![], vec![]],
@@ -183,7 +182,7 @@ impl Board {
         match *step {
             Step::Sdo(data) => self.sdo(data),
             Step::Read { row } => self.sdo(upload(self.row(row))),
-            Step::Write { row, value } => self.sdo(download(self.row(row), value)),
+            Step::Write { row, value } => self.sdo(download(self.row(row), Step::download(row, value))),
             Step::Nmt { command, to_all } => self.nmt(command, to_all),
             Step::Process { place, len, remote, data } => {
                 self.receive(pick(&self.filters[0], place), len, remote, data);
@@ -200,8 +199,9 @@ impl Board {
             }
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
-            Step::Congest(is_congested) => {
-                self.out = Queue { is_congested, ..Queue::default() };
+            Step::Congest(congestion) => {
+                let (is_congested, length) = Step::queue(congestion);
+                self.out = Queue { waiting: vec![], is_congested, length };
                 self.watch_anew();
             }
             Step::PowerCycle => self.power_on(self.retained()),
