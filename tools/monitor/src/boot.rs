@@ -40,6 +40,11 @@ impl Boot {
         self.since.is_some()
     }
 
+    /// Whether a boot-up message was seen.
+    pub(crate) fn has_booted(&self) -> bool {
+        self.has_booted
+    }
+
     /// A boot-up message. Returns whether the restart was not seen before it.
     pub(crate) fn boot_up(&mut self, is_injected: bool, findings: &mut Findings) -> bool {
         let is_first = !std::mem::replace(&mut self.has_booted, true);

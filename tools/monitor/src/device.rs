@@ -194,11 +194,17 @@ impl Device {
         self.errors.advance(inhibit, now, findings);
     }
 
-    /// The SDO request of a client to the node with this node-ID. Before the boot-up message, the node may miss it.
+    /// The SDO request of a client to the node with this node-ID. Before the boot-up message, the node may miss it, or
+    /// answer after the message.
     pub(crate) fn request(&mut self, node: u8, data: &[u8], now: Instant) {
-        if self.id == Some(node) && !self.boot.is_waiting() {
+        if self.id.is_some_and(|id| id != node) {
+            return;
+        }
+        let is_running = self.id.is_some() && !self.boot.is_waiting();
+        if is_running {
             self.take_request(data, now);
-        } else if self.id.is_none() || self.id == Some(node) {
+        }
+        if !is_running || !self.boot.has_booted() {
             self.early.extend(data.try_into().ok().map(|data| (node, data)));
         }
     }
@@ -271,6 +277,7 @@ impl Device {
         if id == 0x700 + node {
             self.on_heartbeat(frame.data(), at, findings);
         } else if id == 0x580 + node {
+            self.early.clear();
             self.nmt.sdo(findings);
             if let Some(event) = self.channel.response(frame.data(), findings) {
                 self.on_event(event, at, findings);

@@ -158,7 +158,7 @@ impl Monitor {
             Incident::Restart => device.may_restart(),
             Incident::Touched => device.touch(),
             Incident::PowerOn | Incident::PowerOff | Incident::SoftwareReset => {
-                device.restart(Scope::All, at)
+                device.restart(Scope::All, at);
             }
             Incident::ChipReset => {
                 let was_touched = device.chip_reset(at);

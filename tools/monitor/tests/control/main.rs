@@ -133,3 +133,43 @@ fn an_injected_fault_excuses_a_reset_until_the_next_boot_up() {
     monitor.incident(Instant(40_000), 0, Incident::ChipReset);
     assert_eq!(monitor.breaches()[0].rule, Rule::UnexpectedReset);
 }
+
+/// The breaches in these frames of node 5.
+fn breaches_of(frames: &[(u64, u16, &[u8])]) -> String {
+    let mut monitor = Monitor::new();
+    monitor.set_sheet_of_node(NODE, sheet(), true);
+    for (at, id, data) in frames {
+        monitor.frame(Instant(*at), &Frame::new(*id, data).unwrap(), Sender::Unknown);
+    }
+    monitor.end();
+    text(&monitor)
+}
+
+const READ: (u16, &[u8]) = (0x605, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+const ANSWER: (u16, &[u8]) = (0x585, &[0x43, 0x00, 0x10, 0, 1, 2, 3, 4]);
+const BOOT_UP: (u16, &[u8]) = (0x705, &[0]);
+
+#[test]
+fn a_request_before_the_boot_up_message_may_be_answered_after_it() {
+    let frames = [(1_000, READ), (2_000, BOOT_UP), (3_000, ANSWER)].map(|(at, (id, data))| (at, id, data));
+    assert_eq!(breaches_of(&frames), "");
+    let again = [frames.as_slice(), &[(30_000, ANSWER.0, ANSWER.1)]].concat();
+    assert!(breaches_of(&again).contains("a response without a request"));
+}
+
+#[test]
+fn requests_in_a_row_have_as_many_answers_at_most() {
+    let (boot_up, read, answer) = ((1_000, BOOT_UP), READ, ANSWER);
+    let row = [
+        (10_000, read),
+        (10_500, read),
+        (11_000, read),
+        (15_000, answer),
+        (20_000, answer),
+        (25_000, answer),
+    ];
+    let frames: Vec<_> = [boot_up].into_iter().chain(row).map(|(at, (id, data))| (at, id, data)).collect();
+    assert_eq!(breaches_of(&frames), "");
+    let again = [frames.as_slice(), &[(30_000, ANSWER.0, ANSWER.1)]].concat();
+    assert!(breaches_of(&again).contains("a response without a request"));
+}
