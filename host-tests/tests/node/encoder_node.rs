@@ -195,6 +195,17 @@ fn the_device_type_and_the_mapping_follow_the_sensors_at_the_next_reset() {
     assert_eq!(positions(&mut bench, TPDO1), [55]);
 }
 
+/// Both entries have the same bits, but what was saved is there after a reset.
+#[test]
+fn a_saved_mapping_stays_when_a_second_sensor_is_chosen() {
+    let mut bench = booted();
+    bench.write(0x2100, 2, &[7]).unwrap();
+    bench.write(0x1010, 1, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(number(&mut bench, 0x1000, 0), 0x000A_0196);
+    assert_eq!([number(&mut bench, 0x1A00, 1), number(&mut bench, 0x1A01, 1)], [0x6004_0020; 2]);
+}
+
 #[test]
 fn the_serial_number_is_that_of_the_identity() {
     let mut bench = booted();

@@ -8,8 +8,6 @@ use std::ops::Range;
 
 use canbus::Time;
 use host_tests::thorough::{either, is_thorough};
-use host_tests::watch::expects;
-use monitor::Rule;
 use sign::image::Image;
 
 use super::bench::{Bench, CLEAR, STATUS, signed, version_a, version_b};
@@ -198,7 +196,6 @@ fn the_power_goes_at_every_odd_operation_of_an_update() {
 /// Both programs are real applications here, so each of them answers.
 #[test]
 fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
-    let _expected = expects([Rule::HeartbeatLate]);
     let cuts = either(4, 8);
     let (a, b) = (version_a(), version_b(0));
     let words = (b.to_bytes().len() / 4) as u64;

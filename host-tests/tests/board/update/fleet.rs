@@ -202,7 +202,6 @@ fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
 /// two.
 #[test]
 fn a_node_of_several_is_switched_off_halfway_and_gone_on_with() {
-    let _expected = expects([Rule::HeartbeatLate]);
     let (nodes, off) = either((2, 1), (4, 2));
     let world = boards(nodes);
     let (a, b) = (version_a(), version_b(0));
