@@ -15,7 +15,7 @@
 //! The boot-up message is an event before which no other frame may be on the bus, although most CAN-IDs are more
 //! urgent. The queue holds all other frames back until the boot-up message has left its mailbox.
 
-use canopen::{Frame, QueueFull, Transmit};
+use canopen::{CanId, Frame, QueueFull, Transmit};
 use heapless::Vec;
 
 /// Capacity in frames.
@@ -70,13 +70,15 @@ pub struct TransmitQueue {
     waiting: Vec<Waiting, CAPACITY>,
     /// The queue was cleared since the last look at the mailboxes.
     is_cleared: bool,
+    /// A PDO was moved into a mailbox since all mailboxes were empty.
+    has_moved_pdo: bool,
 }
 
 impl TransmitQueue {
     /// An empty queue.
     #[must_use]
     pub const fn new() -> TransmitQueue {
-        TransmitQueue { boot_up: BootUp::Sent, waiting: Vec::new(), is_cleared: false }
+        TransmitQueue { boot_up: BootUp::Sent, waiting: Vec::new(), is_cleared: false, has_moved_pdo: false }
     }
 
     /// Moves frames into the mailboxes until they take no more.
@@ -87,11 +89,13 @@ impl TransmitQueue {
     /// Moves one frame into a mailbox. Returns whether the mailboxes may take another one now.
     pub fn step(&mut self, mailboxes: &mut impl Mailboxes) -> bool {
         mailboxes.settle(core::mem::take(&mut self.is_cleared));
+        self.has_moved_pdo &= !mailboxes.is_idle();
         let Some(frame) = self.next(mailboxes) else { return false };
         let offer = mailboxes.offer(&frame);
         if offer == Offer::Refused {
             return false;
         }
+        self.has_moved_pdo |= is_pdo(&frame);
         if matches!(self.boot_up, BootUp::Waits(_)) {
             self.boot_up = BootUp::InMailbox;
         } else {
@@ -124,7 +128,7 @@ impl TransmitQueue {
 
     /// Drops all waiting frames, and the frame that is on its way out of a mailbox.
     pub fn clear(&mut self) {
-        self.is_cleared = true;
+        (self.is_cleared, self.has_moved_pdo) = (true, false);
         self.waiting.clear();
         self.boot_up = BootUp::Sent;
     }
@@ -182,6 +186,14 @@ impl Transmit for TransmitQueue {
     fn room(&self) -> usize {
         CAPACITY - self.waiting.len()
     }
+
+    fn has_waiting_pdo(&self) -> bool {
+        self.has_moved_pdo || self.waiting.last().is_some_and(|waiting| is_pdo(&waiting.frame))
+    }
+}
+
+fn is_pdo(frame: &Frame) -> bool {
+    frame.id() <= CanId::LAST_PDO.get()
 }
 
 #[cfg(test)]

@@ -9,6 +9,9 @@ impl CanId {
     /// NMT commands (CiA 301, 7.3.5).
     pub const NMT: CanId = CanId(0x000);
 
+    /// The last CAN-ID of PDOs in the pre-defined connection set (CiA 301, 7.3.5).
+    pub const LAST_PDO: CanId = CanId(0x57F);
+
     /// The function code in an identifier of the pre-defined connection set.
     pub(crate) const FUNCTION: u16 = 0x780;
 

@@ -46,6 +46,13 @@ pub trait Transmit {
 
     /// How many frames `send` would take now.
     fn room(&self) -> usize;
+
+    /// Whether a queued PDO waits for the bus: a frame with a CAN-ID up to [`CanId::LAST_PDO`](crate::CanId::LAST_PDO). While
+    /// other nodes hold the bus, a device earns no share of it for its PDOs, so that less urgent frames get through. A
+    /// queue that cannot tell returns `false`.
+    fn has_waiting_pdo(&self) -> bool {
+        false
+    }
 }
 
 /// One call of the device: its time and the transmit queue. While the bit rate changes, the queue is closed: it accepts
@@ -92,7 +99,7 @@ impl<T: Transmit> ProcessContext<'_, T> {
     #[inline]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
         let len = frame.len();
-        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(frame.id(), len, self.now);
+        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.admits(frame.id(), len);
         is_admitted && self.out.send_state(frame).is_ok() && self.spend(len)
     }
 
@@ -105,7 +112,12 @@ impl<T: Transmit> ProcessContext<'_, T> {
 
     /// Whether `send_event` would take a frame with this CAN-ID and number of bytes now.
     pub(crate) fn takes_event(&mut self, id: u16, len: usize) -> bool {
-        self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)
+        self.room() > ROOM_FOR_OTHERS && self.admits(id, len)
+    }
+
+    #[inline(always)]
+    fn admits(&mut self, id: u16, len: usize) -> bool {
+        self.budget.admits(id, len, self.now, || self.out.has_waiting_pdo())
     }
 
     fn spend(&mut self, len: usize) -> bool {

@@ -2,7 +2,7 @@
 //!
 //! The CAN-IDs of PDOs are more urgent than those of SDO and heartbeat. A node whose PDOs fill the bus would silence its
 //! own heartbeat and its own SDO server, and no master could correct its settings. PDOs therefore take at most three
-//! quarters of the bus, after a burst of a few milliseconds. A PDO without credit waits, and is sent with its newest
+//! quarters of the bus, after a burst of a few milliseconds, and leave gaps on a bus that other nodes keep busy. A PDO without credit waits, and is sent with its newest
 //! values. The longest waiting PDO has the first claim, so no PDO starves another one.
 //!
 //! A burst leaves the bus to the services again after 36 ms and the time of four PDOs at most, 90 ms at 10 kbit/s.
@@ -35,31 +35,49 @@ pub(crate) struct Budget {
     claim_end: Instant,
     credit: u32,
     refilled: Instant,
+    /// The credit after the last refill.
+    after_refill: u32,
+    /// The cost of the PDOs that may be unsent without foreign frames on the bus.
+    unsent: u32,
 }
 
 impl Budget {
     /// A full budget.
     pub(crate) const fn new(kbit: u16) -> Budget {
-        Budget { kbit, claimant: 0, claim_end: Instant(0), credit: limit(kbit), refilled: Instant(0) }
+        Budget {
+            kbit,
+            claimant: 0,
+            claim_end: Instant(0),
+            credit: limit(kbit),
+            refilled: Instant(0),
+            after_refill: limit(kbit),
+            unsent: 0,
+        }
     }
 
     /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.
     pub(crate) fn set_bit_rate(&mut self, kbit: u16) {
-        (self.kbit, self.credit, self.claim_end) = (kbit, limit(kbit), Instant(0));
+        *self = Budget { refilled: self.refilled, ..Budget::new(kbit) };
     }
 
     /// Whether the PDO with this CAN-ID and number of bytes may be sent now.
     #[inline]
-    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Instant) -> bool {
-        self.credit >= ENOUGH || self.admits_scarce(id, len, now)
+    pub(crate) fn admits(
+        &mut self,
+        id: u16,
+        len: usize,
+        now: Instant,
+        is_waiting: impl FnOnce() -> bool,
+    ) -> bool {
+        self.credit >= ENOUGH || self.admits_scarce(id, len, now, is_waiting())
     }
 
     #[inline(never)]
-    fn admits_scarce(&mut self, id: u16, len: usize, now: Instant) -> bool {
+    fn admits_scarce(&mut self, id: u16, len: usize, now: Instant, is_waiting: bool) -> bool {
         if self.claimant != id && self.claim_end > now {
             return false;
         }
-        self.refill(now);
+        self.refill(now, is_waiting);
         let is_admitted = self.credit >= cost(len) || self.kbit == 0;
         self.claimant = id;
         self.claim_end = if is_admitted { Instant(0) } else { now.plus(CLAIM) };
@@ -71,11 +89,18 @@ impl Budget {
         self.credit = self.credit.saturating_sub(cost(len));
     }
 
-    fn refill(&mut self, now: Instant) {
+    /// Earns credit for the time since the last refill. A PDO that still waits, although the bus had the time for it, shows
+    /// that others hold the bus. Then nothing is earned: the PDOs leave the next gaps to less urgent frames.
+    fn refill(&mut self, now: Instant, is_waiting: bool) {
         let elapsed =
             u32::try_from(now.0.saturating_sub(self.refilled.0)).unwrap_or(FULL_AFTER).min(FULL_AFTER);
-        let earned = elapsed * u32::from(self.kbit) * SHARE / 4;
-        (self.credit, self.refilled) = ((self.credit + earned).min(limit(self.kbit)), now);
+        let passed = elapsed * u32::from(self.kbit);
+        let spent = self.after_refill.saturating_sub(self.credit);
+        self.unsent = (self.unsent + spent).saturating_sub(passed);
+        if !is_waiting || self.unsent > 0 {
+            self.credit = (self.credit + passed / 4 * SHARE).min(limit(self.kbit));
+        }
+        (self.after_refill, self.refilled) = (self.credit, now);
     }
 }
 
@@ -103,7 +128,7 @@ mod tests {
         let mut frames = [0; 8];
         for ms in 0..10_000 {
             for (id, count) in (0x181..).zip(&mut frames) {
-                if budget.admits(id, 8, Instant(ms * 1000)) {
+                if budget.admits(id, 8, Instant(ms * 1000), || false) {
                     budget.spend(8);
                     *count += 1;
                 }
@@ -132,22 +157,46 @@ mod tests {
         }
     }
 
+    /// Foreign frames leave 40 per cent of the bus, in which a frame takes two and a half times as long. Eight PDOs are due
+    /// at every millisecond.
+    #[test]
+    fn on_a_bus_that_others_hold_gaps_are_left() {
+        for kbit in RATES {
+            let (mut budget, mut free_at, mut waiting) = (Budget::new(kbit), 0, 0);
+            let span = u64::from(135_000 * 5 / 2 / u32::from(kbit));
+            for ms in 0..10_000 {
+                let now = ms * 1000;
+                for id in 0x181..0x189 {
+                    if budget.admits(id, 8, Instant(now), || now < free_at) {
+                        budget.spend(8);
+                        free_at = free_at.max(now) + span;
+                    }
+                }
+                waiting += (free_at.max(now) - now).min(1000);
+            }
+            assert!(
+                (5_000_000..9_500_000).contains(&waiting),
+                "{kbit} kbit/s: a PDO waits for {waiting} us of 10 s"
+            );
+        }
+    }
+
     #[test]
     fn an_instant_before_the_last_refill_earns_nothing() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Instant(1_000_000)) {
+        while budget.admits(0x181, 8, Instant(1_000_000), || false) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x181, 8, Instant(999_999)));
+        assert!(!budget.admits(0x181, 8, Instant(999_999), || false));
     }
 
     #[test]
     fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Instant(0)) {
+        while budget.admits(0x181, 8, Instant(0), || false) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x281, 8, Instant(2_000)), "181h has the claim");
-        assert!(budget.admits(0x281, 8, Instant(40_000)), "the claim of 181h has ended");
+        assert!(!budget.admits(0x281, 8, Instant(2_000), || false), "181h has the claim");
+        assert!(budget.admits(0x281, 8, Instant(40_000), || false), "the claim of 181h has ended");
     }
 }
