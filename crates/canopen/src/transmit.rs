@@ -99,7 +99,7 @@ impl<T: Transmit> ProcessContext<'_, T> {
     #[inline]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
         let len = frame.len();
-        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.admits(frame.id(), len);
+        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(frame.id(), len, self.now);
         is_admitted && self.out.send_state(frame).is_ok() && self.spend(len)
     }
 
@@ -112,12 +112,7 @@ impl<T: Transmit> ProcessContext<'_, T> {
 
     /// Whether `send_event` would take a frame with this CAN-ID and number of bytes now.
     pub(crate) fn takes_event(&mut self, id: u16, len: usize) -> bool {
-        self.room() > ROOM_FOR_OTHERS && self.admits(id, len)
-    }
-
-    #[inline(always)]
-    fn admits(&mut self, id: u16, len: usize) -> bool {
-        self.budget.admits(id, len, self.now, || self.out.has_waiting_pdo())
+        self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)
     }
 
     fn spend(&mut self, len: usize) -> bool {

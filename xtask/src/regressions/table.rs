@@ -70,7 +70,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_tpdo_every_millisecond_leaves_room_at_every_bit_rate",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
             fault: "true || self.admits_scarce(id, len, now)",
         }],
     },
@@ -90,7 +90,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_noisy_pressure_without_inhibit_time_leaves_room",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
             fault: "true || self.admits_scarce(id, len, now)",
         }],
     },
@@ -100,7 +100,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::three_position_units_of_a_lift_leave_room_by_their_defaults",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
             fault: "true || self.admits_scarce(id, len, now)",
         }],
     },
@@ -110,7 +110,7 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "starving::a_cyclic_timer_of_a_millisecond_leaves_room",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= ENOUGH || self.admits_scarce(id, len, now)",
+            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
             fault: "true || self.admits_scarce(id, len, now)",
         }],
     },

@@ -84,6 +84,7 @@ impl Services {
         now: Instant,
         out: &'a mut Q,
     ) -> ProcessContext<'a, Q> {
+        self.budget.begin(now, || out.has_waiting_pdo());
         ProcessContext { now, out, is_open: !self.lss.is_switching(), budget: &mut self.budget }
     }
 }

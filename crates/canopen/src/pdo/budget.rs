@@ -23,6 +23,8 @@ const CLAIM: Duration = Duration(3 * RETRY.0);
 /// Credit that is enough for any PDO; a power of two, which one instruction compares.
 const ENOUGH: u32 = 1 << 18;
 const _: () = assert!(ENOUGH > cost(8), "the longest PDO costs less");
+/// Credit that is enough for one call of the device, as a rule: it earns nothing yet.
+const PLENTY: u32 = 1 << 22;
 
 /// Credit for process data, in thousandths of a bit.
 #[derive(Debug)]
@@ -31,9 +33,11 @@ pub(crate) struct Budget {
     kbit: u16,
     /// The CAN-ID of the PDO with the first claim.
     claimant: u16,
-    /// The end of the claim. Until then only the claimant earns credit, so the credit is short for all others.
+    /// The end of the claim.
     claim_end: Instant,
     credit: u32,
+    /// The credit with which a PDO is admitted without a look at the claim; out of reach while there is one.
+    enough: u32,
     refilled: Instant,
     /// The credit after the last refill.
     after_refill: u32,
@@ -49,6 +53,7 @@ impl Budget {
             claimant: 0,
             claim_end: Instant(0),
             credit: limit(kbit),
+            enough: ENOUGH,
             refilled: Instant(0),
             after_refill: limit(kbit),
             unsent: 0,
@@ -60,27 +65,29 @@ impl Budget {
         *self = Budget { refilled: self.refilled, ..Budget::new(kbit) };
     }
 
+    /// A call of the device begins. `is_waiting`: whether a PDO that was queued before waits for the bus.
+    #[inline]
+    pub(crate) fn begin(&mut self, now: Instant, is_waiting: impl FnOnce() -> bool) {
+        if self.credit < PLENTY {
+            self.refill(now, is_waiting());
+        }
+    }
+
     /// Whether the PDO with this CAN-ID and number of bytes may be sent now.
     #[inline]
-    pub(crate) fn admits(
-        &mut self,
-        id: u16,
-        len: usize,
-        now: Instant,
-        is_waiting: impl FnOnce() -> bool,
-    ) -> bool {
-        self.credit >= ENOUGH || self.admits_scarce(id, len, now, is_waiting())
+    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Instant) -> bool {
+        self.credit >= self.enough || self.admits_scarce(id, len, now)
     }
 
     #[inline(never)]
-    fn admits_scarce(&mut self, id: u16, len: usize, now: Instant, is_waiting: bool) -> bool {
+    fn admits_scarce(&mut self, id: u16, len: usize, now: Instant) -> bool {
         if self.claimant != id && self.claim_end > now {
             return false;
         }
-        self.refill(now, is_waiting);
         let is_admitted = self.credit >= cost(len) || self.kbit == 0;
         self.claimant = id;
-        self.claim_end = if is_admitted { Instant(0) } else { now.plus(CLAIM) };
+        (self.claim_end, self.enough) =
+            if is_admitted { (Instant(0), ENOUGH) } else { (now.plus(CLAIM), u32::MAX) };
         is_admitted
     }
 
@@ -91,6 +98,7 @@ impl Budget {
 
     /// Earns credit for the time since the last refill. A PDO that still waits, although the bus had the time for it, shows
     /// that others hold the bus. Then nothing is earned: the PDOs leave the next gaps to less urgent frames.
+    #[inline(never)]
     fn refill(&mut self, now: Instant, is_waiting: bool) {
         let elapsed =
             u32::try_from(now.0.saturating_sub(self.refilled.0)).unwrap_or(FULL_AFTER).min(FULL_AFTER);
@@ -127,8 +135,9 @@ mod tests {
         let mut budget = Budget::new(kbit);
         let mut frames = [0; 8];
         for ms in 0..10_000 {
+            budget.begin(Instant(ms * 1000), || false);
             for (id, count) in (0x181..).zip(&mut frames) {
-                if budget.admits(id, 8, Instant(ms * 1000), || false) {
+                if budget.admits(id, 8, Instant(ms * 1000)) {
                     budget.spend(8);
                     *count += 1;
                 }
@@ -166,8 +175,9 @@ mod tests {
             let span = u64::from(135_000 * 5 / 2 / u32::from(kbit));
             for ms in 0..10_000 {
                 let now = ms * 1000;
+                budget.begin(Instant(now), || now < free_at);
                 for id in 0x181..0x189 {
-                    if budget.admits(id, 8, Instant(now), || now < free_at) {
+                    if budget.admits(id, 8, Instant(now)) {
                         budget.spend(8);
                         free_at = free_at.max(now) + span;
                     }
@@ -184,19 +194,22 @@ mod tests {
     #[test]
     fn an_instant_before_the_last_refill_earns_nothing() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Instant(1_000_000), || false) {
+        budget.begin(Instant(1_000_000), || false);
+        while budget.admits(0x181, 8, Instant(1_000_000)) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x181, 8, Instant(999_999), || false));
+        budget.begin(Instant(999_999), || false);
+        assert!(!budget.admits(0x181, 8, Instant(999_999)));
     }
 
     #[test]
     fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Instant(0), || false) {
+        while budget.admits(0x181, 8, Instant(0)) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x281, 8, Instant(2_000), || false), "181h has the claim");
-        assert!(budget.admits(0x281, 8, Instant(40_000), || false), "the claim of 181h has ended");
+        assert!(!budget.admits(0x281, 8, Instant(2_000)), "181h has the claim");
+        budget.begin(Instant(40_000), || false);
+        assert!(budget.admits(0x281, 8, Instant(40_000)), "the claim of 181h has ended");
     }
 }
