@@ -37,7 +37,8 @@ pub(crate) fn run(flags: &Flags) -> Result<()> {
     report.run([builds_for_host(), builds_for_target(needs, flags.thorough)], Vec::new())?;
     let tests = suite::collect(flags.thorough, report.only())?;
     monitored::begin();
-    report.run([checks_for_host(), checks_for_target()], tests)?;
+    let result = report.run([checks_for_host(), checks_for_target()], tests);
     monitored::print();
+    result?;
     report.finish()
 }
