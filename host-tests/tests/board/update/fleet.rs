@@ -138,7 +138,8 @@ fn one_image_updates_every_personality() {
         let flags = format!("--bitrate {kbit} --node {node}:{personality}");
         let world = share(world(&flags));
         let (a, b) = (version_a(), version_b(0));
-        for [from, to] in [[&a, &b], [&b, &a]] {
+        // `nodectl_updates_to_b_and_back` has the way back in each run.
+        for [from, to] in either(vec![[&a, &b]], vec![[&a, &b], [&b, &a]]) {
             assert_eq!(update(&world, &node.to_string(), to, None), [updated(node, [from, to])], "{flags}");
         }
     }
@@ -156,7 +157,8 @@ fn nodectl(world: &Shared, node: u8, command: &str) -> Result<Value, String> {
 #[test]
 fn nodectl_confirms_a_program_on_trial_or_rolls_it_back() {
     let (a, b) = (version_a(), version_b(0));
-    for (personality, kbit) in PERSONALITIES.into_iter().zip([1000, 125, 250, 500]) {
+    let all: Vec<_> = PERSONALITIES.into_iter().zip([1000, 125, 250, 500]).collect();
+    for (personality, kbit) in either(vec![all[0], all[3]], all) {
         let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
         for command in ["confirm", "rollback"] {
             assert_eq!(nodectl(&world, 16, command).unwrap_err(), "node 16: its program is not on trial");
