@@ -132,13 +132,17 @@ impl Bus {
     }
 
     /// The time in us that was free for a frame of this device with this identifier: the bus was idle, or carried less
-    /// urgent frames or other frames of the device.
+    /// urgent frames, or frames that the device sends by itself. Its SDO responses are not free time: a client asks for
+    /// them.
     pub(crate) fn room(&self, device: usize, id: u16, from: Instant, to: Instant) -> f64 {
         let oldest = self.recent.front().filter(|_| self.recent.len() == KEPT);
         let from = (from.0 as f64).max(oldest.map_or(0.0, |passed| passed.start));
         let to = to.0 as f64;
         let others = self.recent.iter().rev().take_while(|passed| passed.end > from);
-        let others = others.filter(|passed| passed.device != Some(device) && passed.frame.id() < id);
+        let is_asked_for = |passed: &&Passed| (0x581..0x600).contains(&passed.frame.id());
+        let others = others.filter(|passed| {
+            passed.frame.id() < id && (passed.device != Some(device) || is_asked_for(passed))
+        });
         let busy: f64 = others
             .map(|passed| (passed.end.min(to) + 3.0 * self.bit() - passed.start.max(from)).max(0.0))
             .sum();
@@ -224,6 +228,18 @@ mod tests {
             bus.take(Instant(at as u64), &frame(id, &data), None);
         }
         assert!((bus.bit() - 8.0).abs() < 1e-9, "125 kbit/s: {}", bus.bit());
+    }
+
+    #[test]
+    fn a_client_that_asks_without_a_pause_leaves_no_room() {
+        let mut bus = Bus::new();
+        bus.set_bit_rate(10_000);
+        for n in 0..20 {
+            let (id, device) = if n % 2 == 0 { (0x601, None) } else { (0x581, Some(0)) };
+            bus.take(Instant((n + 1) * 12_000), &frame(id, &[0x55; 8]), device);
+        }
+        let room = bus.room(0, 0x701, Instant(0), Instant(240_000));
+        assert!(room < 24_000.0, "{room}");
     }
 
     #[test]
