@@ -35,7 +35,19 @@ pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
     rows
 }
 
-/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check) first.
+/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check) first: a wrong table
+/// does not compile, and the error names index and sub-index of the row.
+///
+/// ```compile_fail
+/// use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
+/// use canopen::objects;
+///
+/// const INPUT: Object =
+///     Object::new(0x6000, 0, "Input", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
+///
+/// // evaluation panicked: 1A00h:1: the mapped object is not in the table
+/// static DICTIONARY: Dictionary = canopen::dictionary!(&objects::tpdo(1, &[INPUT]));
+/// ```
 #[macro_export]
 macro_rules! dictionary {
     ($rows:expr) => {{
@@ -140,16 +152,24 @@ impl<const D: usize, const S: usize, const P: usize, const A: usize, const V: us
     }
 }
 
-/// The row of the event timer of a TPDO.
-///
-/// # Panics
-/// During compilation, when there is none.
-pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
-    let mut row = 0;
-    while rows[row].key() != (0x1800 | number as u32) << 8 | 5 {
-        row += 1;
+/// The position of a row in a sorted table.
+pub(super) const fn find(rows: &[Object], index: u16, sub: u8) -> Option<usize> {
+    let key = (index as u32) << 8 | sub as u32;
+    let (mut low, mut high) = (0, rows.len());
+    while low < high {
+        let middle = low.midpoint(high);
+        if rows[middle].key() < key {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
     }
-    row
+    if low < rows.len() && rows[low].key() == key { Some(low) } else { None }
+}
+
+/// The row of the event timer of a TPDO. `check` has verified that there is one.
+pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
+    find(rows, 0x1800 | number as u16, 5).expect("the TPDO has no event timer")
 }
 
 /// How many series the objects of a table form.

@@ -9,8 +9,10 @@
 
 mod builder;
 mod check;
+mod check_pdos;
 mod compile;
 mod entry;
+mod fail;
 mod field;
 mod group;
 mod limits;
@@ -24,6 +26,7 @@ pub use check::check;
 pub use compile::{Counts, Sizes, compile, count, gather, image_size};
 pub use entry::Entry;
 pub(crate) use entry::little_endian;
+pub(crate) use fail::fail;
 pub use field::Field;
 pub use group::{Group, Groups};
 pub use object::{Access, DefaultValue, Mapping, Object};

@@ -1,7 +1,7 @@
 //! The rows of PDOs: whole PDOs, and single rows for PDOs with other properties.
 
 use super::{list, parameter};
-use crate::dictionary::{DefaultValue, Object, Type};
+use crate::dictionary::{DefaultValue, Object, Type, fail};
 use crate::pdo::MappedObject;
 
 /// The default COB-ID of PDO `number`, from 1. `base` is 180h for a TPDO and 200h for an RPDO. The PDOs 1 to 4 have a
@@ -64,7 +64,9 @@ pub const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
 /// During compilation, for more than eight objects.
 #[must_use]
 pub const fn mapping(index: u16, name: &'static str, mapped: &[i64]) -> [Object; 9] {
-    assert!(mapped.len() <= 8, "a PDO has eight places");
+    if mapped.len() > 8 {
+        fail(index, 0, "a PDO of these functions maps at most eight objects");
+    }
     let mut rows: [Object; 9] = list(count(index, name, mapped.len() as i64), slot(index, 1, 0));
     let mut i = 0;
     while i < mapped.len() {
@@ -125,18 +127,24 @@ pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
 
 /// A mapping parameter for `objects`, which must be mappable in this direction.
 const fn mapping_of(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
-    assert!(objects.len() <= 8, "a PDO has eight places");
+    if objects.len() > 8 {
+        fail(index, 0, "a PDO of these functions maps at most eight objects");
+    }
     let (mut i, mut len, mut mapped) = (0, 0, [0; 8]);
     while i < objects.len() {
-        let (object, mapping) = (&objects[i], objects[i].mapping);
-        assert!(!is_sent || mapping.allows_tpdo(), "an object cannot be mapped into a TPDO");
-        assert!(is_sent || mapping.allows_rpdo(), "an object cannot be mapped into an RPDO");
+        let object = &objects[i];
+        let allows = if is_sent { object.mapping.allows_tpdo() } else { object.mapping.allows_rpdo() };
+        if !allows {
+            fail(object.index, object.sub, "the object cannot be mapped in this direction");
+        }
         len += object.kind.size();
         let object = MappedObject { index: object.index, sub: object.sub, bits: object.kind.size() * 8 };
         mapped[i] = object.encode() as i64;
         i += 1;
     }
-    assert!(len <= 8, "the objects are longer than a PDO");
+    if len > 8 {
+        fail(index, 0, "the mapped objects have more than eight bytes");
+    }
     mapping(index, name, mapped.split_at(objects.len()).0)
 }
 
