@@ -31,7 +31,7 @@ mod program;
 
 use crate::dictionary::{Access, DefaultValue, Group, Object, Type, fail};
 
-pub use pdo::{rpdo, tpdo};
+pub use pdo::{multiplexed, rpdo, tpdo};
 pub use program::{flash_status, program_control, program_data, program_identification};
 
 /// A read-only value of the device.

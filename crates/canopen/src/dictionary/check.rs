@@ -99,15 +99,17 @@ const fn check_mapping(row: &Object) {
 /// The rule of a row is that of its index, so an entry of CiA 301 keeps its service.
 const fn check_rule(row: &Object) {
     let own = Rule::of(row.index, row.sub);
-    let fits = match (own, row.rule) {
-        (Rule::Plain, Rule::Application | Rule::Setting | Rule::StoreCalibration | Rule::EventTimerOf(_)) => {
-            true
-        }
-        (Rule::PdoCobId, Rule::PdoPredefined) => true,
+    let is_chosen = match own {
+        Rule::Plain => matches!(
+            row.rule,
+            Rule::Application | Rule::Setting | Rule::StoreCalibration | Rule::EventTimerOf(_)
+        ),
+        Rule::PdoCobId => matches!(row.rule, Rule::PdoPredefined),
         // A bootloader controls the program itself.
-        (Rule::ProgramControl, Rule::Application) => true,
-        (own, rule) => own.code() == rule.code(),
+        Rule::ProgramControl => matches!(row.rule, Rule::Application),
+        _ => false,
     };
+    let fits = is_chosen || own.code() == row.rule.code();
     require(
         fits,
         row,

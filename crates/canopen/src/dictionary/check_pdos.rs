@@ -38,6 +38,11 @@ const fn check_communication(rows: &[Object], row: &Object) {
     let Some(transmission) = Transmission::parse(default_byte(kind)) else {
         fail(kind.index, 2, "the transmission types 241 to 251 are reserved");
     };
+    require(
+        !transmission.is_synchronous() || find(rows, 0x1005, 0).is_some(),
+        kind,
+        "the transmission type needs SYNC, and the table has no 1005h",
+    );
     let needs_remote = transmission.needs_remote();
     require(is_sent(row) || !needs_remote, kind, "an RPDO has no transmission type 252 or 253");
     // The COB-IDs with the lowest and with the highest node-ID.

@@ -2,7 +2,7 @@
 #![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use super::builder::{TableBuilder, attributes, is_same, larger};
-use super::{Access, Dictionary, Object, Tables, Type, check};
+use super::{Access, Dictionary, Object, Services, Tables, Type, check};
 
 /// The number of rows in all parts of a table.
 #[must_use]
@@ -252,13 +252,16 @@ pub struct Sizes {
     pub watches: usize,
     /// Number of objects that a multiplexed TPDO can send; 0 if no TPDO can be multiplexed.
     pub scanned: usize,
+    /// The services that the rows ask for.
+    pub services: Services,
 }
 
 impl Sizes {
     /// The room that these rows need.
     #[must_use]
     pub const fn of(rows: &[Object]) -> Sizes {
-        let mut sizes = Sizes { image: image_size(rows), tpdos: 0, rpdos: 0, watches: 0, scanned: 0 };
+        let (image, services) = (image_size(rows), Services::of(rows));
+        let mut sizes = Sizes { image, tpdos: 0, rpdos: 0, watches: 0, scanned: 0, services };
         let (mut i, mut is_multiplexed) = (0, false);
         while i < rows.len() {
             let row = &rows[i];
@@ -286,6 +289,7 @@ impl Sizes {
                 rpdos: larger(sizes.rpdos, own.rpdos),
                 watches: larger(sizes.watches, own.watches),
                 scanned: larger(sizes.scanned, own.scanned),
+                services: sizes.services.with(own.services),
             };
             i += 1;
         }
@@ -300,11 +304,12 @@ impl Sizes {
             && self.rpdos <= room.rpdos
             && self.watches <= room.watches
             && self.scanned <= room.scanned
+            && room.services.contains(self.services)
     }
 }
 
 /// Whether the number of mapped objects can be 254 or 255.
-const fn can_be_multiplexed(count: &Object) -> bool {
+pub(super) const fn can_be_multiplexed(count: &Object) -> bool {
     let (_, high) = effective_limits(count);
     match count.default {
         _ if count.access.is_writable() => high >= 0xFE,
@@ -335,6 +340,7 @@ macro_rules! device {
             { $sizes.rpdos },
             { $sizes.watches },
             { $sizes.scanned },
+            { $sizes.services.bits() },
         >
     };
     ($application:ty, $rows:expr) => {

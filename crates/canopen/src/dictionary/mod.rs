@@ -19,6 +19,7 @@ mod limits;
 mod object;
 mod packed;
 mod rule;
+mod services;
 mod tables;
 mod types;
 
@@ -32,5 +33,6 @@ pub use group::{Group, Groups};
 pub use object::{Access, DefaultValue, Mapping, Object};
 pub use packed::{BufferFull, is_packed, packed_size};
 pub use rule::Rule;
+pub use services::Services;
 pub use tables::{Dictionary, Entries, Tables};
 pub use types::Type;

@@ -1,7 +1,7 @@
 //! The rows of PDOs: whole PDOs, and single rows for PDOs with other properties.
 
 use super::{list, parameter};
-use crate::dictionary::{DefaultValue, Object, Type, fail};
+use crate::dictionary::{DefaultValue, Object, Rule, Type, fail};
 use crate::pdo::MappedObject;
 
 /// The default COB-ID of PDO `number`, from 1. `base` is 180h for a TPDO and 200h for an RPDO. The PDOs 1 to 4 have a
@@ -45,11 +45,31 @@ pub const fn sync_start(index: u16) -> Object {
     parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
 }
 
-/// The number of mapped objects. The row has no limit: 254 and 255 make the PDO a multiplexed one, and the rule of the
-/// entry checks the number against the mapping entries.
+/// The number of mapped objects, at most eight. The rule of the entry checks the number against the mapping entries.
+/// [`multiplexed`] allows 254 and 255 as well.
 #[must_use]
 pub const fn count(index: u16, name: &'static str, used: i64) -> Object {
-    parameter(index, 0, name, Type::Unsigned8).value(used)
+    let row = parameter(index, 0, name, Type::Unsigned8).value(used);
+    if used > 8 { row } else { row.limits(0, 8) }
+}
+
+/// Allows a PDO to be a multiplexed one: its number of mapped objects can be 254 or 255 (CiA 301, 7.2.2.6). Takes the
+/// rows of PDOs or of mapping parameters. A device links multiplexed PDOs only if one of its PDOs allows them.
+///
+/// ```
+/// use canopen::objects;
+/// const ROWS: [canopen::dictionary::Object; 15] = objects::multiplexed(objects::tpdo(2, &[]));
+/// ```
+#[must_use]
+pub const fn multiplexed<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
+    let mut i = 0;
+    while i < N {
+        if matches!(rows[i].rule, Rule::PdoCount) {
+            rows[i].limits = None;
+        }
+        i += 1;
+    }
+    rows
 }
 
 /// A mapped object: index, sub-index and length in bits.

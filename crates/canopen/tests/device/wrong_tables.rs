@@ -64,8 +64,11 @@ fn a_reserved_transmission_type_does_not_compile() {
     }
     for kind in [0, 1, 240, 252, 253, 254, 255] {
         let rows = objects::with(objects::tpdo(1, &[INPUT]), 2, kind);
-        assert_eq!(compile_error(&[&rows, &[INPUT]]), None);
+        assert_eq!(compile_error(&[&rows, &objects::sync_consumer(), &[INPUT]]), None);
     }
+    let rows = objects::with(objects::tpdo(1, &[INPUT]), 2, 1);
+    let message = "1800h:2: the transmission type needs SYNC, and the table has no 1005h";
+    assert_error(&[&rows, &[INPUT]], message);
     let rows = objects::with(objects::rpdo(1, &[OUTPUT]), 2, 253);
     assert_error(&[&rows, &[OUTPUT]], "1400h:2: an RPDO has no transmission type 252 or 253");
 }
@@ -79,7 +82,7 @@ fn a_pdo_that_is_valid_can_be_sent() {
     assert_error(&[&rows], "1800h:1: the CAN-ID is reserved for another service");
     rows[1] = rows[1].default(DefaultValue::Integer(0x800));
     assert_error(&[&rows], "1800h:1: the COB-ID has a CAN-ID of more than 11 bits");
-    let mut rows = objects::with(objects::tpdo(1, &[INPUT]), 2, 252);
+    let mut rows = objects::with(objects::tpdo(1, &[INPUT]), 2, 253);
     rows[1] = rows[1].default(DefaultValue::NodeId(0x4000_0180));
     assert_error(&[&rows, &[INPUT]], "1800h:2: the transmission type needs remote frames");
 }
