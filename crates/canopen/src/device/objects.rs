@@ -162,7 +162,7 @@ impl<
             }
             Rule::EmcyInhibit if Self::has(Services::EMCY) => self.emcy.set_inhibit(low_half(value), now),
             Rule::EmcyCobId if Self::has(Services::EMCY) && self.emcy.configure(value) => {
-                self.report_active(now)
+                self.report_active(now);
             }
             Rule::HeartbeatWatch if W > 0 => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine if M > 0 => self.configure_pdos(now),

@@ -13,8 +13,12 @@ impl<B: Body> Node<B> {
     /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        if self.is_request(frame) {
+            let _ = self.poll_process(now, out);
+            return self.on_service_frame(frame, now, out);
+        }
         self.take_process_frame(frame, now, out);
-        self.take_service_frame(frame, now, out);
+        self.take_other_service(frame, now, out);
         self.services_next()
     }
 

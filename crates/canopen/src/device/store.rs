@@ -240,7 +240,8 @@ impl<
         let (dictionary, node_id) = (self.basic.dictionary, self.basic.node_id);
         // An application that stores nothing returns this constant, and the compiler removes the rest.
         if packed.is_empty() && soundness == Soundness::Whole {
-            (self.lost.set(group, false), self.older.set(group, false));
+            self.lost.set(group, false);
+            self.older.set(group, false);
             return self.basic.application.loaded(group, true);
         }
         let fits = dictionary.unpack(group, node_id, packed, &mut self.basic.image).is_ok()

@@ -108,3 +108,14 @@ fn without_1014h_a_fault_sets_the_error_register_and_1029h_stops_the_node() {
     let _ = device.start(Instant(7), &mut sent);
     assert_eq!((register.u8(device.image()) & 1, device.state()), (1, State::Stopped));
 }
+
+#[test]
+fn an_sdo_request_does_not_delay_process_data_that_is_due() {
+    let (mut device, mut sent) = operational(Nothing);
+    download(&mut device, (0x1800, 5), &10_u16.to_le_bytes(), Instant(2)).unwrap();
+    let _ = device.poll(Instant(2), &mut sent);
+    sent.0.clear();
+    let upload = Frame::new(0x600 | u16::from(ID), &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap();
+    let _ = device.on_frame(&upload, Instant(10_002), &mut sent);
+    assert_eq!(sent.0.iter().map(Frame::id).collect::<Vec<_>>(), [0x185, 0x585]);
+}
