@@ -80,3 +80,24 @@ impl Type {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_range_of_an_integer_follows_from_its_size() {
+        let unsigned = [Type::Unsigned8, Type::Unsigned16, Type::Unsigned32, Type::Unsigned48];
+        let signed = [Type::Integer8, Type::Integer16, Type::Integer32];
+        for kind in unsigned {
+            assert_eq!(kind.range(), Some((0, (1_i64 << (kind.size() * 8)) - 1)), "{kind:?}");
+        }
+        for kind in signed {
+            let half = 1_i64 << (kind.size() * 8 - 1);
+            assert_eq!(kind.range(), Some((-half, half - 1)), "{kind:?}");
+        }
+        assert_eq!(Type::Unsigned48.range(), Some((0, 0xFFFF_FFFF_FFFF)));
+        assert_eq!(Type::Unsigned64.range(), Some((0, i64::MAX)));
+        assert_eq!(Type::Boolean.range(), Some((0, 1)));
+    }
+}

@@ -18,13 +18,19 @@ const ROWS: &[Object] = canopen::rows!(
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
+/// The longest values in a multiplexed PDO.
+const WIDE_INPUT: Object =
+    Object::new(0x6001, 0, "", Type::Unsigned32, Access::ReadOnly).mappable(Mapping::Tpdo).value(0x0403_0201);
+const WIDE_OUTPUT: Object =
+    Object::new(0x6200, 0, "", Type::Unsigned32, Access::ReadWrite).mappable(Mapping::Rpdo);
+
 const MULTIPLEXED_ROWS: &[Object] = canopen::rows!(
     objects::sync_consumer(),
     objects::emergency(),
     objects::store_parameters(),
     objects::multiplexed(objects::tpdo(1, &[INPUT])),
     objects::multiplexed(objects::rpdo(1, &[])),
-    [INPUT],
+    [INPUT, WIDE_INPUT, WIDE_OUTPUT],
 );
 static MULTIPLEXED: Dictionary = canopen::dictionary!(MULTIPLEXED_ROWS);
 
@@ -49,7 +55,7 @@ fn operational<A: Application>(application: A) -> (Lean<A>, Sent) {
 #[test]
 fn the_rows_decide_on_the_services() {
     assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::NONE, 0));
-    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (Services::ALL, 1));
+    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (Services::ALL, 2));
 }
 
 #[test]
@@ -67,6 +73,26 @@ fn a_pdo_is_multiplexed_only_if_its_rows_allow_it() {
     download(&mut device, (0x1800, 1), &0x8000_0185_u32.to_le_bytes(), Instant(1)).unwrap();
     download(&mut device, (0x1A00, 0), &[0xFF], Instant(2)).unwrap();
     download(&mut device, (0x1600, 0), &[0xFE], Instant(3)).unwrap();
+}
+
+#[test]
+fn a_multiplexed_pdo_carries_a_value_of_four_bytes() {
+    type Node = canopen::device!(Nothing, MULTIPLEXED_ROWS);
+    let (mut device, mut sent): (Node, _) =
+        (Device::new(&MULTIPLEXED, NodeId::new(ID), Nothing), Sent::default());
+    let _ = device.start(Instant(0), &mut sent);
+    for (index, id) in [(0x1800, 0x185_u32), (0x1400, 0x301)] {
+        download(&mut device, (index, 1), &(0x8000_0000 | id).to_le_bytes(), Instant(1)).unwrap();
+        download(&mut device, (index + 0x200, 0), &[0xFF], Instant(1)).unwrap();
+        download(&mut device, (index, 1), &id.to_le_bytes(), Instant(1)).unwrap();
+    }
+    sent.0.clear();
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(2), &mut sent);
+    let _ = device.poll(Instant(3), &mut sent);
+    assert!(sent.0.iter().any(|frame| frame.data() == [0x80, 0x01, 0x60, 0, 1, 2, 3, 4]), "{:?}", sent.0);
+    let write = Frame::new(0x301, &[0x80 | ID, 0x00, 0x62, 0, 5, 6, 7, 8]).unwrap();
+    let _ = device.on_frame(&write, Instant(4), &mut sent);
+    assert_eq!(MULTIPLEXED.field(0x6200, 0).u32(device.image()), 0x0807_0605);
 }
 
 #[test]
