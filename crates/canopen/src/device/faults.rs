@@ -17,6 +17,7 @@ const TO_STOPPED: u32 = 2;
 /// An event that the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum BusEvent {
     /// A received frame was lost.
     Overrun,

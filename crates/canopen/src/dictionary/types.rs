@@ -2,6 +2,7 @@
 
 /// A data type that an entry can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Type {
     /// BOOLEAN, a byte of 0 or 1. A PDO carries it as eight bits.
     Boolean,
@@ -21,7 +22,9 @@ pub enum Type {
     Unsigned48,
     /// UNSIGNED64; the default value can have at most 63 bits.
     Unsigned64,
-    /// REAL32
+    /// REAL32, a finite number. Infinities and NaN are refused: as a default they do not compile, a download gets the
+    /// abort code 0609 0030h, a PDO leaves them out, and stored values with them count as damaged. The application may
+    /// write them to the image, for example to mark a measured value as invalid; they are sent as they are.
     Real32,
     /// `VISIBLE_STRING` of at most this many characters.
     VisibleString(u8),
