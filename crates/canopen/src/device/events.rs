@@ -6,8 +6,15 @@ use crate::pdo::Chain;
 use crate::transmit::ProcessContext;
 use crate::{Instant, Transmit};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// The TPDO at this place can be sent from now on.
     pub(super) fn begin_events(&mut self, place: usize) {

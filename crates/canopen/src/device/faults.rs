@@ -4,6 +4,7 @@ use super::body::Body;
 use super::full::Full;
 use super::{Application, Device, ErrorClass, Next, STALE};
 use crate::Instant;
+use crate::dictionary::Services;
 use crate::emcy::Fault;
 use crate::nmt::State;
 
@@ -16,6 +17,7 @@ const TO_STOPPED: u32 = 2;
 /// An event that the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum BusEvent {
     /// A received frame was lost.
     Overrun,
@@ -29,8 +31,15 @@ pub enum BusEvent {
     Recovered,
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Device<A, N, T, R, W, M, S>
 {
     /// Takes an event of the CAN controller: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
     /// communication error. A warning has no emergency code, because the node still works; a worse state is reported as
@@ -67,8 +76,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Applies object 1029h to the errors since the last call.
     ///
@@ -88,7 +104,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         let has_to_stop = self.basic.pending.next_state == Some(State::Stopped);
-        if has_to_stop && self.emcy.is_idle() && !self.is_bus_off {
+        if has_to_stop && (!Self::has(Services::EMCY) || self.emcy.is_idle()) && !self.is_bus_off {
             self.basic.pending.next_state = None;
             self.enter(State::Stopped);
         }
@@ -126,14 +142,24 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     // Not inlined: many callers, none of them time-critical.
     #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
-        if self.emcy.raise(fault, now) {
+        let is_new = if Self::has(Services::EMCY) {
+            self.emcy.raise(fault, now)
+        } else {
+            self.emcy.raise_silently(fault)
+        };
+        if is_new {
             self.fault_changed(fault, true);
         }
     }
 
     #[inline(never)]
     pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
-        if self.emcy.clear(fault, now) {
+        let was_active = if Self::has(Services::EMCY) {
+            self.emcy.clear(fault, now)
+        } else {
+            self.emcy.clear_silently(fault)
+        };
+        if was_active {
             self.fault_changed(fault, false);
         }
     }

@@ -53,12 +53,20 @@ use full::Full;
 use services::Services;
 
 /// A device with an application `A`, and room for its dictionary: an image of `N` bytes, `T` TPDOs, `R` RPDOs, `W`
-/// heartbeats to monitor, and `M` objects that a multiplexed TPDO sends.
+/// heartbeats to monitor, and `M` objects that a multiplexed TPDO sends. `S` is the set of
+/// [`Services`](crate::dictionary::Services); the code of services outside the set is not linked.
 ///
 /// [`device!`](crate::device!) gives the type for a table of rows. PDOs, heartbeats and objects beyond the room do not
 /// work.
-pub type Device<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> =
-    Node<Full<A, N, T, R, W, M>>;
+pub type Device<
+    A,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16 = { crate::dictionary::Services::ALL.bits() },
+> = Node<Full<A, N, T, R, W, M, S>>;
 
 /// A device with NMT, SDO, heartbeat and LSS only, such as a bootloader: an application `A` and an image of `N` bytes.
 ///

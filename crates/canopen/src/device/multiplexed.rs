@@ -16,8 +16,15 @@ const DISPATCHING_LIST: u16 = 0x1FD0;
 /// The longest value in a multiplexed PDO, in bytes.
 const LONGEST: u8 = 4;
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Gives the producer its settings and its objects, after any change that may affect them. Unchanged settings keep
     /// the record of the values that have been sent, so nothing is sent again.

@@ -4,7 +4,7 @@ use super::body::Body;
 use super::full::Full;
 use super::pdos::low_half;
 use super::{Application, Job, Part, STALE};
-use crate::dictionary::{Entry, Rule, Type, little_endian};
+use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Instant, emcy, sync};
 
@@ -107,22 +107,38 @@ fn write_by_rule(
     Ok(())
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Whether the rule of the entry allows the value.
     pub(super) fn admit_value(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         match entry.rule() {
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
-            Rule::SyncCobId => sync::check_cob_id(value),
-            Rule::SyncOverflow => sync::check_overflow(value, self.basic().number(0x1006, 0)),
-            Rule::EmcyCobId => emcy::check_cob_id(self.basic().word(entry.field), value),
+            Rule::SyncCobId if Self::has(Services::SYNC) => sync::check_cob_id(value),
+            Rule::SyncOverflow if Self::has(Services::SYNC) => {
+                sync::check_overflow(value, self.basic().number(0x1006, 0))
+            }
+            Rule::EmcyCobId if Self::has(Services::EMCY) => {
+                emcy::check_cob_id(self.basic().word(entry.field), value)
+            }
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
+            Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting
+                if !Self::has(Services::STORE) =>
+            {
+                Err(Abort::NotStored)
+            }
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
             Rule::StoreCalibration => self.admit_store_calibration(value),
             Rule::Setting => self.begin_deferred(Job::Setting(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
-            Rule::HeartbeatWatch => self.admit_watch(entry, value),
+            Rule::HeartbeatWatch if W > 0 => self.admit_watch(entry, value),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType
@@ -139,13 +155,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         match entry.rule() {
             Rule::Application => self.apply_application_changes(now),
             Rule::ErrorCount => self.emcy.clear_history(),
-            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
+            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow
+                if Self::has(Services::SYNC) =>
+            {
                 self.configure_sync(now);
             }
-            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value), now),
-            Rule::EmcyCobId if self.emcy.configure(value) => self.report_active(now),
-            Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
-            Rule::ScannerLine => self.configure_pdos(now),
+            Rule::EmcyInhibit if Self::has(Services::EMCY) => self.emcy.set_inhibit(low_half(value), now),
+            Rule::EmcyCobId if Self::has(Services::EMCY) && self.emcy.configure(value) => {
+                self.report_active(now);
+            }
+            Rule::HeartbeatWatch if W > 0 => self.configure_watch(entry.sub(), now),
+            Rule::ScannerLine if M > 0 => self.configure_pdos(now),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType

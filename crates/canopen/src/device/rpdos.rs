@@ -3,12 +3,19 @@
 use super::body::Body;
 use super::full::Full;
 use super::{Application, STALE};
-use crate::dictionary::{Entry, Rule, little_endian};
+use crate::dictionary::{Entry, Rule, Services, little_endian};
 use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Takes a data frame that may be an RPDO. A valid frame clears the faults of its RPDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
@@ -25,7 +32,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         // A frame that has no RPDO of its own goes to the RPDO for all nodes, if it can be a multiplexed PDO.
-        if let Some((id, place)) = self.all_nodes
+        if Self::has(Services::MULTIPLEXED_RPDO)
+            && let Some((id, place)) = self.all_nodes
             && !is_own
             && id.is_of_same_service(frame.id())
             && self.is_mpdo(frame)
@@ -36,14 +44,16 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Instant) {
         let Some(rpdo) = self.rpdos.get_mut(place) else { return };
-        let late = rpdo.is_synchronous() && self.sync.is_window_over(now);
+        let late = Self::has(Services::SYNC) && rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
         self.basic.process_due = self.basic.process_due.min(rpdo.due());
         let has_faults = rpdo.has_faults();
         if is_valid {
             self.store_rpdo(place, frame.bytes());
         }
-        if let Reception::Multiplexed(addressing) = reception {
+        if Self::has(Services::MULTIPLEXED_RPDO)
+            && let Reception::Multiplexed(addressing) = reception
+        {
             self.on_mpdo(frame.bytes(), addressing, now);
         }
         if reception != Reception::Complete || has_faults {

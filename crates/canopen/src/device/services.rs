@@ -98,10 +98,18 @@ impl<B: Body> Node<B> {
     /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        if self.services.server.takes_block() && self.take_segment(frame, now) {
-            return self.process_next();
+        match frame.full(self.services.sdo_request) {
+            Some(request) => {
+                // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
+                // transfer.
+                let server = &mut self.services.server;
+                if server.takes_block() && server.take_segment(request, now) {
+                    return self.process_next();
+                }
+                self.take_request(request, now, out);
+            }
+            None => self.take_other_service(frame, now, out),
         }
-        self.take_service_frame(frame, now, out);
         self.services_next()
     }
 
@@ -120,26 +128,36 @@ impl<B: Body> Node<B> {
         [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
     }
 
-    /// Takes a frame if it is a block segment that needs no further processing. Called in any state: without SDO, there
-    /// is no transfer.
-    #[inline]
-    fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
-        let request = frame.full(self.services.sdo_request);
-        request.is_some_and(|request| self.services.server.take_segment(request, now))
+    /// Takes a request to the SDO server.
+    #[inline(never)]
+    #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
+    fn take_request(&mut self, request: &[u8; 8], now: Instant, out: &mut impl Transmit) {
+        if self.body.basic().state.has_services() {
+            self.on_request(request, &mut self.services.context(now, out));
+        }
+        self.send_due_services(now, out);
     }
 
+    /// Takes a frame that is no request to the SDO server: LSS, or the heartbeat of another node.
     #[inline(never)]
-    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        if let Some(request) = frame.full(self.services.sdo_request) {
-            if self.body.basic().state.has_services() {
-                self.on_request(request, &mut self.services.context(now, out));
-            }
-        } else if frame.id() == lss::REQUEST.get() {
+    pub(super) fn take_other_service(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if frame.id() == lss::REQUEST.get() {
             let context = &mut self.services.context(now, out);
             self.services.lss.take_frame(frame, context, &mut self.body);
         } else if frame.id() & 0x780 == ERROR_CONTROL {
             self.body.on_heartbeat(frame, now);
         }
+        self.send_due_services(now, out);
+    }
+
+    /// Whether a frame is a request to the SDO server.
+    #[inline]
+    pub(super) fn is_request(&self, frame: &Frame) -> bool {
+        frame.full(self.services.sdo_request).is_some()
+    }
+
+    #[inline]
+    fn send_due_services(&mut self, now: Instant, out: &mut impl Transmit) {
         if now >= self.body.basic().services_due {
             self.send_services(now, out);
         }

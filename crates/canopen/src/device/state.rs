@@ -225,8 +225,15 @@ impl<A: Application> Basic<A, [u8]> {
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.

@@ -9,8 +9,15 @@ use crate::sync::Settings;
 use crate::transmit::ProcessContext;
 use crate::{Frame, Instant, Transmit};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     pub(super) fn configure_sync(&mut self, now: Instant) {
         let [overflow, ..] = self.basic().number(0x1019, 0).to_le_bytes();

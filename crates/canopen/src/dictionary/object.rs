@@ -61,7 +61,7 @@ impl Mapping {
 pub enum DefaultValue {
     /// The default of an entry of integer type.
     Integer(i64),
-    /// The default of an entry of type REAL32.
+    /// The default of an entry of type REAL32, a finite number.
     Real(f32),
     /// The default of an entry of type `VISIBLE_STRING`.
     Text(&'static str),
@@ -146,7 +146,7 @@ impl Object {
         self.default(DefaultValue::Integer(value))
     }
 
-    /// Sets a REAL32 default value.
+    /// Sets a REAL32 default value, a finite number.
     #[must_use]
     pub const fn real(self, value: f32) -> Object {
         self.default(DefaultValue::Real(value))

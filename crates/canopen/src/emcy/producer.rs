@@ -102,6 +102,29 @@ impl Producer {
         is_new
     }
 
+    /// As [`Producer::raise`], for a device without EMCY: no message waits.
+    pub(crate) fn raise_silently(&mut self, fault: Fault) -> bool {
+        let is_new = self.active.insert(fault);
+        if is_new {
+            self.errors |= fault.condition(self.conditions).class.map_or(0, error_bit);
+        }
+        is_new
+    }
+
+    /// As [`Producer::clear`], for a device without EMCY.
+    pub(crate) fn clear_silently(&mut self, fault: Fault) -> bool {
+        self.active.remove(fault)
+    }
+
+    /// As [`Producer::restart`], for a device without EMCY.
+    pub(crate) fn restart_silently(&mut self) {
+        self.errors = 0;
+        let active = core::mem::take(&mut self.active);
+        for fault in active.singles() {
+            self.raise_silently(fault);
+        }
+    }
+
     /// Reports an active fault, and returns the bit of its class.
     #[inline(never)]
     pub(crate) fn repeat(&mut self, fault: Fault, now: Instant) -> u8 {

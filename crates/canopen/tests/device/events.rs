@@ -164,3 +164,15 @@ fn a_short_queue_leaves_no_deadline_in_the_past_for_any_tpdo() {
         assert_eq!(told(&mut bench), [1, 2, 3, 4, 5], "room for {room}");
     }
 }
+
+#[test]
+fn the_start_sends_the_present_state_at_once_and_starts_the_event_timer() {
+    for transmission in [254, 255] {
+        let mut bench = configured(transmission, 0, 500);
+        bench.set_value(1, &[9, 0, 0, 0]);
+        bench.nmt(1);
+        assert_eq!(told(&mut bench), [9], "type {transmission}");
+        let start = bench.times_of(TPDO, Duration::from_millis(1000));
+        assert_eq!(start, [500_000, 1_000_000], "type {transmission}");
+    }
+}

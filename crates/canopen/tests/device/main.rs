@@ -24,3 +24,4 @@ mod store;
 mod store_at_once;
 mod sync;
 mod tpdo;
+mod wrong_tables;

@@ -53,8 +53,9 @@ pub(crate) fn download<
     const R: usize,
     const W: usize,
     const M: usize,
+    const S: u16,
 >(
-    device: &mut Device<A, N, T, R, W, M>,
+    device: &mut Device<A, N, T, R, W, M, S>,
     (index, sub): (u16, u8),
     bytes: &[u8],
     now: Instant,

@@ -6,5 +6,6 @@ mod deadlines;
 #[path = "../exchange/mod.rs"]
 mod exchange;
 mod interlocks;
+mod lean;
 mod many;
 mod places;
