@@ -130,7 +130,14 @@ mod tests {
         assert_eq!(cli("--off --bootloader --readout").change(both), new);
         assert_eq!(cli("--brown-out").change(new), new.with_brown_out(true));
         assert_eq!(cli("--off --brown-out").change(new.with_brown_out(true)), new);
-        for flags in ["--brown-out", "--off --brown-out", "--bootloader", "--readout", "--off --bootloader", "--off --readout"] {
+        for flags in [
+            "--brown-out",
+            "--off --brown-out",
+            "--bootloader",
+            "--readout",
+            "--off --bootloader",
+            "--off --readout",
+        ] {
             let cli = cli(flags);
             assert_ne!(cli.change(cli.pretended()), cli.pretended(), "a dry run shows something: {flags}");
         }

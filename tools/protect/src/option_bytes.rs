@@ -116,7 +116,11 @@ impl fmt::Display for OptionBytes {
             BROWN_OUT => "off",
             _ => "below level 3",
         };
-        write!(f, "{:08X}h: bootloader {bootloader}, read-out {read_out}, brown-out reset {brown_out}", self.0)
+        write!(
+            f,
+            "{:08X}h: bootloader {bootloader}, read-out {read_out}, brown-out reset {brown_out}",
+            self.0
+        )
     }
 }
 
