@@ -2,6 +2,7 @@
 //! product code follows from the personality in the device record.
 
 use bsp::bit_timing::BitTiming;
+use bsp::factory;
 use bsp::handover::Handover;
 use bsp::memory::{PARAMETER_PAGE, parameter_pages};
 use canopen::NodeId;
@@ -19,6 +20,8 @@ pub(crate) struct Identity {
     pub(crate) timing: Option<BitTiming>,
     /// 1018h:2, as in the application.
     pub(crate) product: u32,
+    /// 1018h:4. Read once, because during an erase a read of the unique identifier waits as long as one of the flash.
+    pub(crate) serial_number: u32,
 }
 
 impl Identity {
@@ -33,7 +36,8 @@ impl Identity {
             node_id = note.node_id.and_then(NodeId::new);
             timing = Some(note.timing);
         }
-        Identity { node_id, timing, product: product::code(personality) }
+        let serial_number = factory::serial_number();
+        Identity { node_id, timing, product: product::code(personality), serial_number }
     }
 }
 

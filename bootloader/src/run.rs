@@ -62,7 +62,7 @@ impl Run {
         cortex_m::interrupt::free(|_| {
             self.alarm.set(until);
             if !self.frames.ready() {
-                cortex_m::asm::wfi();
+                bsp::sleep();
             }
         });
     }

@@ -67,7 +67,7 @@ impl Session {
             Reason::Copy => updater.install(),
             Reason::Revert => updater.revert(),
         };
-        let program = Program::new(updater, authorisation, identity.product);
+        let program = Program::new(updater, authorisation, &identity);
         Session {
             device: ServiceDevice::new(&DICTIONARY, identity.node_id, program),
             can,

@@ -41,10 +41,9 @@ impl Visit {
         let step = self.0.step(if has_frame { Heard::Frame } else { heard }, Clock::now());
         if step != Step::Stay {
             session.go(step, out);
-            // A frame at the old rate may have ended in the meantime. On the bus, all frames from now on are answered.
-            if self.0.is_listening() {
-                drop_all(frames);
-            }
+            // A frame may have ended before the controller left the old rate. No frame fits between the start at the new
+            // rate and this line, so all frames on the bus from then on are answered.
+            drop_all(frames);
         }
     }
 

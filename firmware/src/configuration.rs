@@ -133,6 +133,12 @@ pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
         Some(node_id) => defmt::info!("node {=u8}", node_id.get()),
         None => defmt::info!("no node-ID: waiting for LSS"),
     }
+    defmt::info!("brown-out reset below {=u16} mV", board::brown_out_level());
+    let tries = retained::clock_tries();
+    if tries > 0 {
+        defmt::warn!("the clock on OSC_IN was late: {=u16} resets without it", tries);
+        retained::set_clock_tries(0);
+    }
     let crash = crash::take();
     if let Some(crash) = &crash {
         crash::log(crash);

@@ -456,7 +456,12 @@ impl<P: Peripherals + 'static> Machine<P> {
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
             (Err(uc_error::READ_PROT), None) if self.cpu.get_data().flash_closed => self.loading = true,
             (Err(error), None) => self.refused(error),
-            (Ok(()), None) => self.sleeping = true,
+            (Ok(()), None) => {
+                self.sleeping = true;
+                // WFI has two bytes.
+                let address = self.pc().wrapping_sub(2);
+                self.cpu.get_data_mut().chip.slept(address);
+            }
         }
     }
 

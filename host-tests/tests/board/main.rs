@@ -31,6 +31,7 @@ mod saves;
 mod scenario;
 mod seeded;
 mod sensor_faults;
+mod silicon;
 mod stack;
 mod start_up;
 mod support;

@@ -20,8 +20,9 @@ const TXRQ: u32 = 1 << 0;
 const TXOK: u32 = 1 << 1;
 const ABRQ: u32 = 1 << 7;
 
-/// Number of polls for an abort: it takes a few clocks, unless the transmission has just begun.
-const ABORT_POLLS: u32 = 100;
+/// Number of polls for an abort: it takes a few clocks of APB1, unless the transmission has just begun. A poll takes
+/// three of these clocks at least. More polls would only make the task longer: it does not need the result at once.
+const ABORT_POLLS: u32 = 16;
 
 /// The transmit mailboxes.
 pub struct Transmitter {
