@@ -69,7 +69,7 @@ pub type Flash = ParameterMemory<Memory<Vec<u8>>>;
 
 /// The pages of the board (memory.x).
 pub const PAGES: Pages = Pages::new(0, 16 * 1024);
-const ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
+static ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
 /// The longest time for which the erase of a page stops the core.
 pub const ERASE: Duration = Duration::from_millis(500);
 

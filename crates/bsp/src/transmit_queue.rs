@@ -187,6 +187,10 @@ impl Transmit for TransmitQueue {
         CAPACITY - self.waiting.len()
     }
 
+    fn replaces(&self, id: u16) -> bool {
+        self.waiting.iter().any(|waiting| waiting.is_state && waiting.frame.id() == id)
+    }
+
     fn has_waiting_pdo(&self) -> bool {
         self.has_moved_pdo || self.waiting.last().is_some_and(|waiting| is_pdo(&waiting.frame))
     }

@@ -47,6 +47,12 @@ pub trait Transmit {
     /// How many frames `send` would take now.
     fn room(&self) -> usize;
 
+    /// Whether [`send_state`](Transmit::send_state) would replace a waiting frame with this CAN-ID. Such a frame costs no
+    /// share of the bus.
+    fn replaces(&self, _id: u16) -> bool {
+        false
+    }
+
     /// Whether a queued PDO waits for the bus: a frame with a CAN-ID up to [`CanId::LAST_PDO`](crate::CanId::LAST_PDO). While
     /// other nodes hold the bus, a device earns no share of it for its PDOs, so that less urgent frames get through. A
     /// queue that cannot tell returns `false`.
@@ -98,9 +104,11 @@ impl<T: Transmit> ProcessContext<'_, T> {
     /// or the process data have taken their share of the bus.
     #[inline]
     pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
-        let len = frame.len();
-        let is_admitted = self.room() > ROOM_FOR_SERVICES && self.budget.admits(frame.id(), len, self.now);
-        is_admitted && self.out.send_state(frame).is_ok() && self.spend(len)
+        let (id, len) = (frame.id(), frame.len());
+        let replaces = self.out.replaces(id);
+        let is_admitted =
+            self.room() > ROOM_FOR_SERVICES && (replaces || self.budget.admits(id, len, self.now));
+        is_admitted && self.out.send_state(frame).is_ok() && (replaces || self.spend(len))
     }
 
     /// Queues a PDO that no newer one may replace: a multiplexed PDO, or one with an event. `false` when there is no room
