@@ -1,6 +1,6 @@
 //! Why the chip was reset, from the flags of `RCC_CSR` (RM0390, 6.3.21).
 
-/// The cause of a reset. The flags accumulate until they are cleared; the order of [`FLAGS`] decides.
+/// The cause of a reset. The flags accumulate until they are cleared; the order of `FLAGS` decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// The independent watchdog was not fed.

@@ -45,7 +45,7 @@ pub(super) fn make_analogue(rcc: &RCC) {
 const fn analogue(pins: u16) -> u32 {
     let [mut bits, mut pin] = [0, 0];
     while pin < 16 {
-        bits |= (pins as u32 >> pin & 1) * 0b11 << (2 * pin);
+        bits |= ((pins as u32 >> pin & 1) * 0b11) << (2 * pin);
         pin += 1;
     }
     bits
