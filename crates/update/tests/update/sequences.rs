@@ -344,7 +344,7 @@ impl Node {
     /// Counter and keys of a program that was never confirmed are not recorded: a program with the counter of the
     /// confirmed one is accepted, and the program that a further update keeps is the confirmed one.
     fn may_be_updated(&self) {
-        if self.diary.len() % 4 != 0 {
+        if !self.diary.len().is_multiple_of(4) {
             return;
         }
         let mut flash = self.flash.clone();
