@@ -23,6 +23,12 @@ const AUTHORISATION: &[Object] = if AUTHORISATION_KEY.is_some() {
     &[]
 };
 
+/// The board, which the header of an image names.
+const BOARD: &[Object] = &[
+    Object::highest(0x2004, 1, "Program state"),
+    Object::new(0x2004, 1, "Board", Type::Unsigned32, Access::ReadOnly).value(product::BOARD as i64),
+];
+
 /// 1F51h, whose commands the bootloader decides on.
 const CONTROL: [Object; 2] = {
     let [highest, control] = objects::program_control();
@@ -35,6 +41,7 @@ pub(crate) const ROWS: &[Object] = canopen::rows!(
     [objects::heartbeat_producer(1000)],
     objects::identity(0, 0, 0),
     AUTHORISATION,
+    BOARD,
     objects::program_data(),
     CONTROL,
     objects::program_identification(),

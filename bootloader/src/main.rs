@@ -11,6 +11,7 @@
 
 mod dictionary;
 mod identity;
+mod memory;
 mod outbox;
 mod program;
 mod run;
@@ -30,7 +31,7 @@ mod app {
     use bsp::filters::Fifo;
     use bsp::loader::Loader;
     use bsp::losses::Losses;
-    use bsp::{ReceiveQueue, Receiver, TimeInterrupt, application};
+    use bsp::{ReceiveQueue, Receiver, TaskEnd, TimeInterrupt, application};
 
     use crate::identity::Identity;
     use crate::outbox::Outbox;
@@ -56,7 +57,7 @@ mod app {
         lost: Losses = Losses::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let mut loader = Loader::start(cx.device);
+        let mut loader = Loader::start(cx.device, cfg!(feature = "development"));
         let (reason, note) = match start::decide(&mut loader) {
             Outcome::Application(vectors) => {
                 loader.rest.stop();
@@ -64,8 +65,8 @@ mod app {
             }
             Outcome::Stay(reason, note) => (reason, note),
         };
-        let bus = loader.rest.start();
         let lost: &'static Losses = cx.local.lost;
+        let bus = loader.rest.start(lost);
         let (receiver, frames) = Receiver::new(Fifo::Services, cx.local.queue, lost);
         let identity = Identity::read(note);
         let authorisation = start::authorisation(note);
@@ -89,17 +90,20 @@ mod app {
 
     #[task(binds = CAN1_RX1, priority = 2, local = [receiver])]
     fn receive(cx: receive::Context) {
+        let _end = TaskEnd;
         cx.local.receiver.drain();
     }
 
     /// Wakes the guest at an error on the bus.
     #[task(binds = CAN1_SCE, priority = 1)]
     fn bus_error(_: bus_error::Context) {
+        let _end = TaskEnd;
         bsp::can::acknowledge_error();
     }
 
     #[task(binds = TIM2, priority = 1, local = [time])]
     fn wake(cx: wake::Context) {
+        let _end = TaskEnd;
         cx.local.time.acknowledge();
     }
 }

@@ -1,13 +1,14 @@
 //! The program on the bus: effects of a master's commands, and values of the objects of CiA 302-3.
 
-use bsp::{ProgramFlash, board, factory};
+use bsp::{ProgramFlash, board};
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};
 use update::{AUTHORISATION_KEY, Authorisation, Proof, Refusal, Updater};
 
 use crate::dictionary::DICTIONARY;
-use crate::target::{PRODUCT, REVISION, TARGET, VENDOR};
+use crate::identity::Identity;
+use crate::target::TARGET;
 
 /// Commands of 1F51h (CiA 302-3).
 const STOP: u8 = 0;
@@ -35,13 +36,22 @@ const AUTHORISATION: Option<[Field; 2]> = if AUTHORISATION_KEY.is_some() {
 pub(crate) struct Program {
     updater: Updater<ProgramFlash>,
     authorisation: Authorisation,
+    /// 1018h:2.
+    product: u32,
+    /// 1018h:4.
+    serial_number: u32,
     /// The program was told to start, and may be started.
     starts: bool,
 }
 
 impl Program {
-    pub(crate) fn new(updater: Updater<ProgramFlash>, authorisation: Authorisation) -> Program {
-        Program { updater, authorisation, starts: false }
+    pub(crate) fn new(
+        updater: Updater<ProgramFlash>,
+        authorisation: Authorisation,
+        identity: &Identity,
+    ) -> Program {
+        let &Identity { product, serial_number, .. } = identity;
+        Program { updater, authorisation, product, serial_number, starts: false }
     }
 
     pub(crate) fn updater(&mut self) -> &mut Updater<ProgramFlash> {
@@ -104,7 +114,7 @@ impl Application for Program {
 
     fn initialise(&mut self, image: &mut [u8]) {
         HARDWARE.set(image, board::NAME.as_bytes());
-        let identity = [VENDOR, PRODUCT, REVISION, factory::serial_number()];
+        let identity = [product::VENDOR_ID, self.product, product::REVISION, self.serial_number];
         for (field, value) in IDENTITY.into_iter().zip(identity) {
             field.store(image, value.to_le_bytes());
         }
@@ -136,7 +146,7 @@ impl Application for Program {
 /// The abort code of a refusal for the SDO client; 1F57h has the details.
 fn abort(refusal: Refusal) -> Abort {
     match refusal {
-        Refusal::NotCleared | Refusal::Unspecified => Abort::DeviceState,
+        Refusal::NotCleared | Refusal::OnTrial | Refusal::Unspecified => Abort::DeviceState,
         _ => Abort::Hardware,
     }
 }

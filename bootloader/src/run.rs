@@ -57,12 +57,12 @@ impl Run {
     /// Sleeps until a time, or until a frame comes. Masked interrupts also end the sleep, so an event between the check
     /// of the queue and the sleep is not missed.
     fn sleep(&mut self, until: Instant) {
-        let soon = Clock::now() + TRANSMIT_POLL;
+        let soon = after(TRANSMIT_POLL);
         let until = if self.queue.is_empty() { until } else { until.min(soon) };
         cortex_m::interrupt::free(|_| {
             self.alarm.set(until);
             if !self.frames.ready() {
-                cortex_m::asm::wfi();
+                bsp::sleep();
             }
         });
     }
@@ -74,6 +74,12 @@ impl Run {
             SCB::sys_reset()
         }
     }
+}
+
+/// The time in `span` from now. Not inlined, because there are many callers and little room in flash.
+#[inline(never)]
+pub(crate) fn after(span: Duration) -> Instant {
+    Clock::now() + span
 }
 
 /// Two short flashes and a pause in a little more than a second, in steps of 2^17 us.

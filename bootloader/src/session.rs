@@ -17,6 +17,7 @@ use crate::dictionary::{DICTIONARY, ROWS};
 use crate::identity::Identity;
 use crate::outbox::Outbox;
 use crate::program::Program;
+use crate::run::after;
 use crate::start::Reason;
 use crate::target::TARGET;
 
@@ -24,8 +25,8 @@ use crate::target::TARGET;
 const PERIOD: Duration = Duration::from_millis(20);
 /// Polling interval while a sector is being erased.
 const ERASE_POLL: Duration = Duration::from_millis(1);
-/// Time for which a reset waits for unsent frames, on a bus where nobody acknowledges.
-const FAREWELL: Duration = Duration::from_millis(20);
+/// Longest time for which a reset waits for unsent frames: at 10 kbit/s a frame of another node, and two of this one.
+const FAREWELL: Duration = Duration::from_millis(50);
 
 /// Everything except the queues.
 pub(crate) struct Session {
@@ -66,8 +67,9 @@ impl Session {
             Reason::Copy => updater.install(),
             Reason::Revert => updater.revert(),
         };
+        let program = Program::new(updater, authorisation, &identity);
         Session {
-            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater, authorisation)),
+            device: ServiceDevice::new(&DICTIONARY, identity.node_id, program),
             can,
             timing: identity.timing.unwrap_or(BitTiming::FASTEST),
             back_off: BackOff::default(),
@@ -115,19 +117,19 @@ impl Session {
     pub(crate) fn step(&mut self, out: &mut Outbox) -> Then {
         let now = Clock::now();
         self.watch_bus(now);
-        let next = self.advance(now);
+        let next = self.advance();
         let next_call = self.device.poll(now, out);
         let due = self.fulfil(next_call, out);
         match (self.reset, next) {
             (Some(latest), _) => Then::Reset(latest),
             (None, Next::Step) => Then::Again,
-            (None, Next::Erasing) => Then::Sleep(due.min(now + ERASE_POLL)),
-            (None, Next::Nothing) => Then::Sleep(due.min(now + PERIOD).min(self.back_off.due())),
+            (None, Next::Erasing) => Then::Sleep(due.min(after(ERASE_POLL))),
+            (None, Next::Nothing) => Then::Sleep(due.min(after(PERIOD)).min(self.back_off.due())),
         }
     }
 
     /// Does one step of the update. A valid image is copied at once: 1F57h is busy until the image can be started.
-    fn advance(&mut self, now: Instant) -> Next {
+    fn advance(&mut self) -> Next {
         let program = self.device.application_mut();
         let mut next = program.updater().poll();
         if program.updater().phase() == Phase::Committed {
@@ -138,13 +140,13 @@ impl Session {
         self.publish();
         if self.is_resuming && next == Next::Nothing {
             self.is_resuming = false;
-            self.start_if_good(now);
+            self.start_if_good();
         }
         next
     }
 
     /// The copy of an earlier start is finished or was refused: starts the application in either case, if it is valid.
-    fn start_if_good(&mut self, now: Instant) {
+    fn start_if_good(&mut self) {
         let updater = self.device.application_mut().updater();
         if updater.phase() == Phase::Installed {
             // The crash count belonged to another image.
@@ -153,7 +155,7 @@ impl Session {
         let start = Start { crashes: retained::crashes(), proof: Proof::Waived, ..Start::default() };
         let flash = updater.flash();
         if matches!(update::boot(flash, &TARGET, start), Decision::Start(_)) {
-            self.reset = Some(now);
+            self.reset_soon();
         }
     }
 
@@ -188,7 +190,7 @@ impl Session {
     }
 
     fn reset_soon(&mut self) {
-        self.reset.get_or_insert(Clock::now() + FAREWELL);
+        self.reset.get_or_insert(after(FAREWELL));
     }
 
     /// Notes node-ID and bit rate for the next start.

@@ -1,18 +1,17 @@
-//! Properties of this node: for the identity object, and for the check of images.
+//! Properties of this node for the check of images.
 
 use bsp::update_layout::LAYOUT;
 use update::Target;
-use update::key::{HAS_DEVELOPMENT_KEY, PUBLIC_KEYS};
-
-pub(crate) use product::{BOARD as PRODUCT, REVISION, VENDOR_ID as VENDOR};
+use update::key::{HAS_PUBLISHED_KEY, PUBLIC_KEYS};
 
 /// Hardware revision of the board.
 const HARDWARE: u8 = 0;
 
 pub(crate) const TARGET: Target =
-    Target { layout: LAYOUT, product: PRODUCT, hardware: HARDWARE, keys: &PUBLIC_KEYS };
+    Target { layout: LAYOUT, board: product::BOARD, hardware: HARDWARE, keys: &PUBLIC_KEYS };
 
 const _: () = assert!(
-    cfg!(feature = "development") || !HAS_DEVELOPMENT_KEY,
-    "the bootloader needs a key of its owner in UPDATE_PUBLIC_KEY, or the feature `development` (docs/update.md)"
+    cfg!(any(feature = "development", feature = "published-keys")) || !HAS_PUBLISHED_KEY,
+    "the bootloader needs a key of its owner in UPDATE_PUBLIC_KEY that is not published, or the feature `development` \
+     (docs/update.md)"
 );

@@ -8,6 +8,7 @@ use canopen::{Duration, Instant};
 
 use crate::identity::Identity;
 use crate::outbox::Outbox;
+use crate::run::after;
 use crate::session::Session;
 
 /// Polling interval for frames and errors. An error ends the sleep earlier.
@@ -40,16 +41,15 @@ impl Visit {
         let step = self.0.step(if has_frame { Heard::Frame } else { heard }, Clock::now());
         if step != Step::Stay {
             session.go(step, out);
-            // A frame at the old rate may have ended in the meantime. On the bus, all frames from now on are answered.
-            if self.0.is_listening() {
-                drop_all(frames);
-            }
+            // A frame may have ended before the controller left the old rate. No frame fits between the start at the new
+            // rate and this line, so all frames on the bus from then on are answered.
+            drop_all(frames);
         }
     }
 
     /// Latest time of the next call of `go_on`.
     pub(crate) fn due(&self) -> Option<Instant> {
-        (!self.0.is_staying()).then(|| Clock::now() + LOOK)
+        (!self.0.is_staying()).then(|| after(LOOK))
     }
 }
 

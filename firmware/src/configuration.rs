@@ -6,10 +6,11 @@ use bsp::reset_cause::ResetCause;
 use bsp::update_layout::LAYOUT;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
 use node::{
-    BitRate, Fault, Identity, NodeId, Parameters, Personality, Protocol, Setup, StoredPositionRecord,
+    BitRate, EraseBudget, Fault, Identity, MemoryState, NodeId, ParameterMemory, Parameters, Personality,
+    Protocol, Setup, StoredPositionRecord,
 };
 use profiles::board::{ChipThermometer, POSITION_RECORD_WORDS, RawSample};
-use storage::{DeviceRecord, Error, Pages, Store, View};
+use storage::{DeviceRecord, Error, Pages, View};
 use update::{Authorisation, Trial};
 
 use crate::bit_rate::Rate;
@@ -29,8 +30,8 @@ pub(crate) struct Loaded {
     pub(crate) rate: Rate,
     /// The fault of the device record, if there is one.
     pub(crate) boot_data: Option<&'static Fault>,
-    /// The prepared store; `None` if nothing can be stored.
-    pub(crate) store: Option<Store<ParameterFlash>>,
+    /// The prepared parameter memory; `None` if nothing can be stored.
+    pub(crate) memory: Option<ParameterMemory<ParameterFlash>>,
     /// The stored record about the retained state.
     pub(crate) position_record: Option<[u32; POSITION_RECORD_WORDS]>,
 }
@@ -44,6 +45,7 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
             let setup = setup(None);
             let protocol = make(place, &setup);
             let parameters = protocol.load_defaults();
+            protocol.show_memory(MemoryState::BROKEN);
             let rate = Rate::Missing;
             return Loaded {
                 protocol,
@@ -51,7 +53,7 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
                 setup,
                 rate,
                 boot_data: None,
-                store: None,
+                memory: None,
                 position_record: None,
             };
         }
@@ -62,11 +64,12 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
     let position_record = StoredPositionRecord::read(&mut view);
-    let mut store = prepare(view);
-    if let Some(store) = &mut store {
-        protocol.set_trial(Trial::read(&mut store.flash().trial(), &LAYOUT));
+    let mut memory = prepare(view);
+    if let Some(memory) = &mut memory {
+        protocol.set_trial(Trial::read(&mut memory.store().flash().trial(), &LAYOUT));
     }
-    Loaded { protocol, parameters, setup, rate, boot_data: fault, store, position_record }
+    protocol.show_memory(memory.as_ref().map_or(MemoryState::BROKEN, ParameterMemory::state));
+    Loaded { protocol, parameters, setup, rate, boot_data: fault, memory, position_record }
 }
 
 /// Not inlined, so that the stack on which the value is made is free again for reading the flash.
@@ -78,8 +81,9 @@ fn make(place: &'static mut MaybeUninit<Protocol>, setup: &Setup) -> &'static mu
 }
 
 /// May erase pages, which stops the core for half a second, so it is called before the node goes on the bus.
-fn prepare(view: View<ParameterFlash>) -> Option<Store<ParameterFlash>> {
-    Store::prepare(view)
+fn prepare(view: View<ParameterFlash>) -> Option<ParameterMemory<ParameterFlash>> {
+    ParameterMemory::prepare(view, EraseBudget::new(retained::erase_budget()))
+        .inspect(|memory| retained::set_erase_budget(memory.budget().word()))
         .inspect_err(|error| defmt::error!("nothing can be stored: {=str}", reason(error)))
         .ok()
 }
@@ -128,6 +132,12 @@ pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
     match setup.node_id {
         Some(node_id) => defmt::info!("node {=u8}", node_id.get()),
         None => defmt::info!("no node-ID: waiting for LSS"),
+    }
+    defmt::info!("brown-out reset below {=u16} mV", board::brown_out_level());
+    let tries = retained::clock_tries();
+    if tries > 0 {
+        defmt::warn!("the clock on OSC_IN was late: {=u16} resets without it", tries);
+        retained::set_clock_tries(0);
     }
     let crash = crash::take();
     if let Some(crash) = &crash {

@@ -59,8 +59,8 @@ mod app {
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{
-        BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TimeInterrupt,
-        Transmitter, Watchdog,
+        BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TaskEnd,
+        TimeInterrupt, Transmitter, Watchdog,
     };
     use node::{Measurement, Parameters, Protocol, StoreJob, StoredPositionRecord};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
@@ -113,10 +113,10 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, rate, boot_data, store, position_record } =
+        let Loaded { protocol, parameters, setup, rate, boot_data, memory, position_record } =
             configuration::load(board.parameters, cx.local.protocol);
         let job = cx.local.job.write(StoreJob::new(setup.personality));
-        let storage = StorageTask::new(store, job, StoredPositionRecord::new(position_record));
+        let storage = StorageTask::new(memory, job, StoredPositionRecord::new(position_record));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working(), boot_data };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
@@ -169,18 +169,20 @@ mod app {
     #[idle]
     fn idle(_: idle::Context) -> ! {
         loop {
-            cortex_m::asm::wfi();
+            bsp::sleep();
         }
     }
 
     #[task(binds = CAN1_RX0, priority = 6, local = [receiver_process])]
     fn receive_process(cx: receive_process::Context) {
+        let _end = TaskEnd;
         cx.local.receiver_process.drain();
         rtic::pend(PROCESS);
     }
 
     #[task(binds = CAN1_RX1, priority = 6, local = [receiver_services])]
     fn receive_services(cx: receive_services::Context) {
+        let _end = TaskEnd;
         cx.local.receiver_services.drain();
         rtic::pend(SERVICES);
     }
@@ -189,6 +191,7 @@ mod app {
     #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup],
            shared = [snapshot, parameters, retained, &watchdog])]
     fn sample(mut cx: sample::Context) {
+        let _end = TaskEnd;
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
         let (measurement, position) = (&mut *cx.local.measurement, cx.local.position);
         cx.shared.parameters.lock(|parameters| {
@@ -214,13 +217,17 @@ mod app {
 
     #[task(binds = CAN1_TX, priority = 4, local = [transmitter], shared = [transmit])]
     fn transmit(mut cx: transmit::Context) {
-        cx.local.transmitter.acknowledge();
-        cx.shared.transmit.lock(|queue| queue.pump(cx.local.transmitter));
+        let _end = TaskEnd;
+        // One frame at a time: a task of the same or a higher priority waits for one frame at most.
+        if cx.shared.transmit.lock(|queue| queue.step(cx.local.transmitter)) {
+            rtic::pend(super::TRANSMIT);
+        }
     }
 
     #[task(binds = TIM2, priority = 3, local = [time, process],
            shared = [protocol, transmit, snapshot, &watchdog])]
     fn process(mut cx: process::Context) {
+        let _end = TaskEnd;
         let [_, services_due] = cx.local.time.acknowledge();
         cx.local.process.wake_services(services_due);
         cx.local.process.run(&mut cx.shared.snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
@@ -230,6 +237,7 @@ mod app {
     #[task(binds = CAN1_SCE, priority = 2, local = [services],
            shared = [protocol, transmit, parameters, &watchdog])]
     fn serve(mut cx: serve::Context) {
+        let _end = TaskEnd;
         let mut node = (cx.shared.protocol, cx.shared.transmit);
         cx.local.services.run(&mut node);
         if let Some(new) = cx.local.services.take_parameters() {
@@ -240,11 +248,14 @@ mod app {
 
     #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
     fn store(mut cx: store::Context) {
+        let _end = TaskEnd;
         let mut node = (cx.shared.protocol, cx.shared.transmit);
-        cx.local.storage.judge(&mut node);
-        cx.local.storage.run(&mut node);
         let retained = cx.shared.retained.lock(|retained| *retained);
+        cx.local.storage.judge(&mut node);
+        cx.local.storage.watch_positions(&retained);
+        cx.local.storage.run(&mut node, cx.shared.watchdog);
         cx.local.storage.keep(&retained, &mut node);
+        cx.local.storage.make_room(&mut node, cx.shared.watchdog);
         cx.shared.watchdog.progress(Part::Storage);
     }
 }

@@ -45,9 +45,9 @@ fn power_on(
     backup: &BackupState,
     stored: Option<[u32; POSITION_RECORD_WORDS]>,
 ) -> PowerOn {
-    let retained = match backup {
+    let retained = match backup.after(cause) {
         BackupState::Nothing => Retained::Nothing,
-        BackupState::Intact(words) => Retained::Words(*words),
+        BackupState::Intact(words) => Retained::Words(words),
         BackupState::Damaged => {
             defmt::error!("what was kept of the encoder is damaged");
             Retained::Damaged

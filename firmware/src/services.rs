@@ -12,7 +12,7 @@ use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
-use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
+use node::{Action, BitRate, BusEvent, Fault, Next, NodeId, Parameters, Protocol, State};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -157,11 +157,17 @@ impl Services {
         next
     }
 
-    /// Continues the detection of the bit rate, and goes on the bus when it is found.
+    /// Continues the detection of the bit rate, and returns to the bus when it is found.
     fn search(&mut self, node: &mut impl Shared) {
-        if self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) {
+        if !self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) {
+            return;
+        }
+        // LSS may have activated the detection in a node that is already running: it keeps its state and its values.
+        if node.call(|protocol, _| protocol.state() == State::Initialising) {
             let next = self.join(node);
             let _ = self.settle(next, node);
+        } else {
+            self.go_on_bus(node);
         }
     }
 
@@ -235,20 +241,17 @@ impl Services {
             return self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out));
         }
         let faults = self.start_up_faults;
-        // In one call: a node with an error must not start by itself before it knows the error.
         let next = self.call(node, |protocol, out| {
             let now = Clock::now();
-            let next = protocol.start(now, out);
-            // The EMCYs are sent with the next poll.
+            // Before the start, which reports all faults before 1029h is applied to any.
             for fault in faults.all() {
                 let _ = protocol.set_fault(fault, true, now);
             }
             // The fault is reported and cleared at once, because the running program is fine.
-            if protocol.is_taken_back() {
-                for is_active in [true, false] {
-                    let _ = protocol.set_fault(&PROGRAM_TAKEN_BACK, is_active, now);
-                }
-            }
+            let is_taken_back = protocol.is_taken_back();
+            let _ = protocol.set_fault(&PROGRAM_TAKEN_BACK, is_taken_back, now);
+            let next = protocol.start(now, out);
+            let _ = protocol.set_fault(&PROGRAM_TAKEN_BACK, false, now);
             next
         });
         self.start_up_faults.crashed = false;
@@ -266,6 +269,9 @@ impl Services {
         };
         defmt::info!("on the bus at {=u16} kbit/s", timing.kbit());
         self.can.start(timing, &Banks::new());
+        if let Some(bit_rate) = BitRate::from_kbit(timing.kbit()) {
+            node.call(|protocol, _| protocol.set_bus_bit_rate(bit_rate));
+        }
         self.hand_over(node, false);
         self.filter(node);
         true

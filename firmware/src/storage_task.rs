@@ -1,49 +1,71 @@
-//! The task of the parameter store, at the lowest priority: it carries out the store jobs of the protocol. The flash
-//! stops the core for 16 us with every word, so all other tasks run between two words.
+//! The task of the parameter memory, at the lowest priority: it carries out the store jobs of the protocol. The flash
+//! stops the core for 16 us with every word, so all other tasks run between two words. The erase of a page stops the core
+//! for 0.25 s, so a page is erased only while that disturbs no service.
 
-use bsp::Clock;
-use bsp::ParameterFlash;
 use bsp::update_layout::LAYOUT;
+use bsp::{Clock, ParameterFlash, Watchdog, retained};
 use canopen::sdo::Abort;
-use node::{StoreJob, StoredPositionRecord, Verdict};
+use canopen::{Duration, Instant};
+use node::{MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict};
 use profiles::board::RETAINED_WORDS;
-use storage::Store;
 use update::Trial;
 
 use crate::SERVICES;
 use crate::shared::Shared;
 
+/// The longest erase of a page of 16 KiB (STM32F446 datasheet, flash memory programming).
+const ERASE: Duration = Duration::from_millis(500);
+/// A sensor at rest for this time stays at rest during an erase. During an erase nothing counts the turns of a shaft.
+const REST: Duration = Duration::from_millis(100);
+
 /// The data that the task owns.
 pub(crate) struct StorageTask {
     /// `None` if the flash could not be prepared, so that nothing can be stored.
-    store: Option<Store<ParameterFlash>>,
+    memory: Option<ParameterMemory<ParameterFlash>>,
     job: &'static mut StoreJob,
     position_record: StoredPositionRecord,
+    /// The retained positions, and the time of their last change.
+    positions: Option<[u32; POSITIONS]>,
+    moved: Instant,
 }
 
 /// The words retained by the last sample; `None` if the profile retains nothing.
 pub(crate) type Retained = Option<[u32; RETAINED_WORDS]>;
 
+/// The retained words about positions. The others are the operating time.
+const POSITIONS: usize = RETAINED_WORDS - 2;
+
 impl StorageTask {
     pub(crate) fn new(
-        store: Option<Store<ParameterFlash>>,
+        memory: Option<ParameterMemory<ParameterFlash>>,
         job: &'static mut StoreJob,
         position_record: StoredPositionRecord,
     ) -> StorageTask {
-        StorageTask { store, job, position_record }
+        StorageTask { memory, job, position_record, positions: None, moved: Instant(0) }
     }
 
     /// Whether the store works.
     pub(crate) fn is_working(&self) -> bool {
-        self.store.is_some()
+        self.memory.is_some()
+    }
+
+    /// Takes note of a movement of the sensors.
+    pub(crate) fn watch_positions(&mut self, retained: &Retained) {
+        let positions = retained.as_ref().and_then(|words| words.first_chunk().copied());
+        if positions != self.positions {
+            (self.positions, self.moved) = (positions, Clock::now());
+        }
     }
 
     /// Stores the record about the retained state, which a start with an empty battery needs.
     pub(crate) fn keep(&mut self, retained: &Retained, node: &mut impl Shared) {
-        if let (Some(store), Some(words)) = (&mut self.store, retained) {
+        if let (Some(memory), Some(words)) = (&mut self.memory, retained) {
             let device = node.call(|protocol, _| protocol.device_record());
-            match self.position_record.keep(words, &device, store) {
-                Ok(true) => defmt::info!("the record of the positions is stored"),
+            match self.position_record.keep(words, &device, memory.store()) {
+                Ok(true) => {
+                    defmt::info!("the record of the positions is stored");
+                    self.report(node);
+                }
                 Ok(false) => {}
                 Err(_) => defmt::error!("the record of the positions is not stored"),
             }
@@ -53,8 +75,8 @@ impl StorageTask {
     /// Carries out the verdict on the trial of this program.
     pub(crate) fn judge(&mut self, node: &mut impl Shared) {
         let Some(verdict) = node.call(|protocol, _| protocol.verdict()) else { return };
-        let Some(store) = &mut self.store else { return };
-        let mut records = store.flash().trial();
+        let Some(memory) = &mut self.memory else { return };
+        let mut records = memory.store().flash().trial();
         let is_done = match verdict {
             Verdict::Confirm => Trial::confirm(&mut records, &LAYOUT).is_ok(),
             Verdict::TakeBack => Trial::withdraw(&mut records, &LAYOUT).is_ok(),
@@ -73,25 +95,49 @@ impl StorageTask {
         }
     }
 
-    /// Carries out the waiting job, if there is one. A program on trial stores nothing, because the previous program
-    /// has to find its settings.
-    pub(crate) fn run(&mut self, node: &mut impl Shared) {
+    /// Carries out the waiting job, if there is one. If the job has moved the store to another page, the old page is
+    /// erased before the response where that is possible: the client waits, and sends nothing.
+    pub(crate) fn run(&mut self, node: &mut impl Shared, watchdog: &Watchdog) {
         let job = &mut *self.job;
         if !node.call(|protocol, _| protocol.take_job(job)) {
             return;
         }
-        let is_on_trial = node.call(|protocol, _| protocol.is_on_trial());
-        let result = match &mut self.store {
-            Some(_) if is_on_trial => Err(Abort::DeviceState),
-            Some(store) => job.run(store),
-            None => Err(Abort::Hardware),
-        };
+        let result = self.memory.as_mut().map_or(Err(Abort::Hardware), |memory| memory.run(job));
         match result {
             Ok(()) => defmt::info!("stored"),
             Err(abort) => defmt::error!("not stored: {=u32:#010x}", abort.code()),
         }
+        self.make_room(node, watchdog);
+        self.report(node);
+        let job = &*self.job;
         // The resulting actions are left to the services task, which finds them at its next poll.
         let _ = node.call(|protocol, out| protocol.finish(job, result, Clock::now(), out));
         rtic::pend(SERVICES);
+    }
+
+    /// Erases the page that is not in use, if it is used up, a pause disturbs no service, and no frame waits.
+    pub(crate) fn make_room(&mut self, node: &mut impl Shared, watchdog: &Watchdog) {
+        let now = Clock::now();
+        let Some(memory) = &mut self.memory else { return };
+        let can_make_room = memory.can_make_room(now);
+        retained::set_erase_budget(memory.budget().word());
+        if !can_make_room || now < self.moved + REST {
+            return;
+        }
+        if !node.call(|protocol, queue| queue.is_empty() && protocol.can_pause(ERASE, now)) {
+            return;
+        }
+        match watchdog.extend(|| memory.make_room()) {
+            Ok(()) => defmt::info!("a parameter page is erased"),
+            Err(_) => defmt::error!("a parameter page cannot be erased"),
+        }
+        retained::set_erase_budget(memory.budget().word());
+        self.report(node);
+    }
+
+    /// Reports room and wear of the memory.
+    fn report(&self, node: &mut impl Shared) {
+        let state = self.memory.as_ref().map_or(MemoryState::BROKEN, ParameterMemory::state);
+        node.call(|protocol, _| protocol.show_memory(state));
     }
 }

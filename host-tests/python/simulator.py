@@ -7,7 +7,9 @@ clock of the host: what is asserted are the virtual time stamps that come with e
 import json
 import os
 import queue
+import re
 import subprocess
+import tempfile
 from pathlib import Path
 
 import can
@@ -23,17 +25,30 @@ BOOT_UP = b"\x00"
 
 
 class Simulator:
-    """The `sim` program with one pressure node, served on free ports."""
+    """The `sim` program with one pressure node, served on free ports.
+
+    The page runs beside it, as with a plain `cargo sim`: a client must not notice the page. `page` is its address; None
+    is for tests of a bus without it.
+    """
 
     #: The simulators that were started; the end of the session stops those that a failed test has left running.
     started: list["Simulator"] = []
 
-    def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader"):
+    def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader", page: str | None = "127.0.0.1:0"):
         images = Path(os.environ["NODE_IMAGES"])
         for name in (bootloader, "firmware"):
             assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images --development` builds it"
         command = [os.environ["SIM_COMMAND"], "--bootloader", images / bootloader, "--firmware", images / "firmware"]
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
+        self.log = Path(flags[flags.index("--candump") + 1]) if "--candump" in flags else self._own_log()
+        if "--candump" not in flags:
+            command += ["--candump", self.log]
+        self.devices = devices(flags)
+        #: Whether the nodes have the values of their data sheets at the start.
+        self.is_new = "--flash" not in flags
+        self.expected: set[str] = set()
+        self.is_judged = False
+        command += ["--page-program", os.environ["NODECTL_COMMAND"], *(["--page", page] if page else ["--no-page"])]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)
         # The first line lists the served addresses.
@@ -41,6 +56,43 @@ class Simulator:
         assert line, "the simulator has ended without serving clients"
         self.greeting = json.loads(line)
         self.socketcand, self.slcan = (int(self.greeting[name].split(":")[1]) for name in ("socketcand", "slcan"))
+
+    @staticmethod
+    def _own_log() -> Path:
+        return Path(tempfile.mkdtemp(prefix="bus-")) / "candump.log"
+
+    def expects(self, *rules: str) -> None:
+        """Names the rules that the test breaks, as `nodectl rules --list` has them."""
+        self.expected |= set(rules)
+
+    def end(self) -> None:
+        """Ends the run if it goes on, and judges the log of its bus."""
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.communicate(timeout=PATIENCE)
+        self.judge()
+
+    def judge(self) -> None:
+        """Judges the log by the rules of the bus, once. A rule that was expected must be broken."""
+        # A simulator that was killed leaves a log without its end.
+        if self.is_judged or self.process.poll() != 0 or not self.devices:
+            return
+        self.is_judged = True
+        command = [os.environ["NODECTL_COMMAND"], "--json", "rules", "--file", self.log]
+        command += ["--of", ",".join(str(node) for node in self.devices)]
+        command += [word for node, device in self.devices.items() for word in ("--device", f"{node}={device}")]
+        result = subprocess.run(command + ["--factory"] * self.is_new, capture_output=True, text=True)
+        assert result.returncode in (0, 10), result.stderr
+        lines = [json.loads(line) for line in result.stdout.splitlines()]
+        breaches = [line for line in lines if "rule" in line]
+        found = {breach["rule"] for breach in breaches}
+        new = [breach for breach in breaches if breach["rule"] not in self.expected]
+        assert not new, f"a rule of the bus is broken: {json.dumps(new[0], indent=1)}"
+        assert self.expected <= found, f"expected and not broken: {self.expected - found}"
+        if "MONITOR_LOG" in os.environ:
+            test = os.environ.get("PYTEST_CURRENT_TEST", "").split(" ")[0]
+            with open(os.environ["MONITOR_LOG"], "a") as log:
+                log.write(f"{test}\t{self.log.read_bytes().count(10)}\t{','.join(sorted(self.expected))}\n")
 
     def command(self, line: str) -> None:
         """Types a command, as on the terminal."""
@@ -66,6 +118,13 @@ class Simulator:
         """A python-can bus over slcan."""
         channel = f"socket://127.0.0.1:{self.slcan}"
         return can.Bus(interface="slcan", channel=channel, sleep_after_open=0, **options)
+
+
+def devices(flags: tuple) -> dict[int, str]:
+    """The node-IDs and personalities of the boards that these flags make."""
+    nodes = [flags[place + 1] for place, flag in enumerate(flags) if flag == "--node"] or ["1:pressure"]
+    parts = [re.fullmatch(r"(\d+):?(\w*).*", str(node)) for node in nodes]
+    return {int(part[1]): part[2] or "pressure" for part in parts if part and int(part[1]) <= 127}
 
 
 class Master:

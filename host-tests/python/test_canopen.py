@@ -22,7 +22,7 @@ EDS = Path(__file__).parents[2] / "eds" / "pressure.eds"
 #: Objects whose value is a command or changes with time.
 COMMANDS = {0x1010, 0x1011, 0x1F51, 0x2203, 0x2204, 0x6125}
 #: Objects that have a default in the EDS although the node measures or counts the value.
-MEASURED = {0x1F56, 0x6100, 0x6130, 0x6150, 0x7130, 0x9130}
+MEASURED = {0x2010, 0x1F56, 0x6100, 0x6130, 0x6150, 0x7130, 0x9130}
 
 
 class NodeWithEds(Master):
@@ -53,7 +53,7 @@ def simulator(tmp_path_factory):
     # The node must have booted once before a reset, so that this boot-up is not taken for the one of the reset.
     Master(simulator).ready().close()
     yield simulator
-    simulator.process.kill()
+    simulator.end()
 
 
 @pytest.fixture

@@ -85,17 +85,18 @@ def check(path: Path) -> None:
 
 def test_a_dump_of_a_node_is_read_by_all(simulator: Simulator, npm: Path, tmp_path: Path):
     """`nodectl dump` writes a DCF (CiA 306): the data sheet with the values of one node."""
-    path = tmp_path / "node.dcf"
+    path, bits = tmp_path / "node.dcf", tmp_path / "bits.dcf"
     Master(simulator).close()
     bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
     command = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", "1"]
-    for arguments in (["write", "1017", "500"], ["write", "6124:1", "0.25"], ["dump", str(path)]):
+    for arguments in (["write", "1017", "500"], ["write", "6124:1", "0.25"], ["dump", str(path)], ["dump", "--bits", str(bits)]):
         subprocess.run([*command, *arguments], check=True, stdout=subprocess.DEVNULL, timeout=PATIENCE)
-    check(path)
+    check(bits)
     dictionary = canopen.import_od(str(path))
     assert dictionary.node_id == 1
     assert (dictionary[0x1017].value, dictionary[0x1017].default) == (500, 1000)
     done = subprocess.run(["node", "-e", SCRIPT, npm, path], capture_output=True, text=True, check=False)
     assert json.loads(done.stdout)["count"] == entries(path)
-    # Lely accepts the bits of a real number.
-    assert "ParameterValue=0x3E800000" in path.read_text(encoding="utf-8")
+    # python-canopen reads decimal numbers, Lely the bits of a real number.
+    assert dictionary[0x6124][1].value == 0.25
+    assert "ParameterValue=0x3E800000" in bits.read_text(encoding="utf-8")

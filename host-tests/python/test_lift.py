@@ -88,4 +88,4 @@ def test_a_master_reads_what_the_node_sends():
             assert position.wait_for_reception(PATIENCE) is not None
     finally:
         master.close()
-        simulator.process.kill()
+        simulator.end()

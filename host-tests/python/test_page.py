@@ -29,7 +29,7 @@ def simulator():
     flags = ["--bitrate", "1000", "--node", "1:pressure", "--node", "2:encoder", "--pressure", "const:200000", "--control", "127.0.0.1:0"]
     simulator = Simulator(*flags, speed="real")
     yield simulator
-    simulator.process.kill()
+    simulator.end()
 
 
 @pytest.fixture(scope="module")

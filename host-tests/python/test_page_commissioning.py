@@ -25,7 +25,7 @@ def simulator():
     flags = [word for node in nodes for word in ("--node", node)]
     simulator = Simulator("--bitrate", "500", "--pressure", "const:200000", "--control", "127.0.0.1:0", *flags, speed="real")
     yield simulator
-    simulator.process.kill()
+    simulator.end()
 
 
 @pytest.fixture(scope="module")

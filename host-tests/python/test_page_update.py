@@ -48,4 +48,4 @@ def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path, driver):
         page.leave()
     finally:
         server.stop()
-        simulator.process.kill()
+        simulator.end()

@@ -1,7 +1,6 @@
 """The page and the control connection that the simulator serves beside the bus."""
 
 import json
-import os
 import socket
 import time
 import urllib.request
@@ -19,7 +18,7 @@ def answers(url: str) -> bool:
 
 
 def with_page(address: str) -> Simulator:
-    return Simulator("--page-program", os.environ["NODECTL_COMMAND"], "--page", address, speed="real")
+    return Simulator(page=address, speed="real")
 
 
 @pytest.mark.parametrize("end", [Simulator.quit, lambda simulator: simulator.process.kill()])

@@ -2,9 +2,12 @@
 sequence of CiA 302-3, back to A by `nodectl update`.
 """
 
+import base64
 import hmac
 import json
 import os
+import re
+import shlex
 import subprocess
 import time
 from pathlib import Path
@@ -25,7 +28,7 @@ DATA, CONTROL, IDENTIFICATION, STATUS = 0x1F50, 0x1F51, 0x1F56, 0x1F57
 def simulator():
     simulator = Simulator("--bitrate", "1000", speed="real")
     yield simulator
-    simulator.process.kill()
+    simulator.end()
 
 
 def image(path: Path, version: str) -> Path:
@@ -99,7 +102,9 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
     assert master.read(IDENTIFICATION, 1) == identification(b)
     master.close()
 
-    # Both images have the same version: a master that compares versions needs no force.
+    # The trial is decided before the next update. Both images have the same version: a master that compares versions
+    # needs no force.
+    assert nodectl(simulator, "confirm")["result"] == "confirmed"
     report = nodectl(simulator, "update", a)
     assert report["result"] == "updated"
     assert (report["old_identification"], report["new_identification"]) == (identification(b), identification(a))
@@ -125,3 +130,48 @@ def test_the_holder_of_its_key_opens_a_node_with_the_standard_library():
     master.write(CONTROL, 1, CLEAR, 1)
     master.close()
     simulator.quit()
+
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def documented(word: str) -> list[str]:
+    """The commands of docs/update.md that begin with this word after `cargo xtask sign`, without their comments."""
+    text = (ROOT / "docs" / "update.md").read_text().replace("\\\n", " ")
+    found = re.findall(rf"^cargo xtask sign ({word} [^#\n]*)", text, re.MULTILINE)
+    assert found, f"docs/update.md has no `cargo xtask sign {word}`"
+    return found
+
+
+def pem(secret: bytes) -> str:
+    """An Ed25519 key in PKCS#8 (RFC 8410)."""
+    der = bytes.fromhex("302e020100300506032b657004220420") + secret
+    return f"-----BEGIN PRIVATE KEY-----\n{base64.b64encode(der).decode()}\n-----END PRIVATE KEY-----\n"
+
+
+def test_the_documented_commands_lead_from_a_key_to_an_accepted_update(tmp_path: Path):
+    """The bootloader of the owner is built with the keys of the tests, so these take the place of the new ones."""
+    home = tmp_path / "home"
+    (home / "secret").mkdir(parents=True)
+    (home / "safe").mkdir()
+
+    def sign(command: str) -> str:
+        images = str(Path(os.environ["NODE_IMAGES"]) / "firmware")
+        command = command.replace("~", str(home)).replace("target/thumbv7em-none-eabihf/release/firmware", images)
+        arguments = [os.environ["SIGN_COMMAND"], *shlex.split(command)]
+        return subprocess.run(arguments, check=True, stdout=subprocess.PIPE, text=True, cwd=tmp_path).stdout
+
+    for command in documented("key"):
+        assert re.fullmatch(r"UPDATE_PUBLIC_KEY=[0-9a-f]{64}\n", sign(command))
+    for name, secret in [("secret/first.pem", 0x42), ("safe/second.pem", 0x43)]:
+        (home / name).write_text(pem(bytes([secret] * 32)))
+    image_of_first, _ = documented("image")
+    sign(image_of_first)
+    for command in documented("show"):
+        assert "signature   good" in sign(command)
+
+    simulator = Simulator("--bitrate", "1000", speed="real", bootloader="bootloader-owner")
+    report = nodectl(simulator, "update", tmp_path / "node-1.4.0.img")
+    assert report["result"] == "updated"
+    assert report["new_identification"] == identification(tmp_path / "node-1.4.0.img")
+    assert simulator.quit()["bus"]["errors"] == 0

@@ -2,23 +2,30 @@
 
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use node::{BitRate, BusEvent, Fault, Identity, Measurement, Personality, Protocol, Setup, StoreJob};
+use embedded_storage::nor_flash::NorFlash;
+use monitor::{Incident, Sender};
+use node::{
+    BitRate, BusEvent, EraseBudget, Fault, Identity, Measurement, ParameterMemory, Personality, Protocol,
+    Setup, StoreJob,
+};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
-use storage::{DeviceRecord, Memory, Pages, Store, View};
+use storage::{DeviceRecord, Memory, Pages, View};
 
 use crate::sdo::{Channel, Client, Failure};
+use crate::watch::{Answers, Watch, sheet};
 
 /// Node-ID of the node on the bench.
 pub const ID: u8 = 0x21;
 
-/// A transmit queue that keeps all frames.
+/// A transmit queue that keeps all frames: for the test, and for the monitor.
 #[derive(Debug, Default)]
-pub struct Queue(pub Vec<Frame>);
+pub struct Queue(pub Vec<Frame>, Vec<Frame>);
 
 impl Transmit for Queue {
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.0.push(frame);
+        self.1.push(frame);
         Ok(())
     }
 
@@ -50,13 +57,21 @@ pub struct Bench {
     has_parameters: bool,
     /// The fault of the device record, if any.
     boot_data: Option<&'static Fault>,
+    watch: Watch,
+    /// The deadline of the last poll.
+    due: Instant,
+    /// Store jobs wait for [`begin_store`](Bench::begin_store); otherwise they are carried out at once.
+    pub stores_later: bool,
 }
 
 /// The parameter store in RAM.
-pub type Flash = Store<Memory<Vec<u8>>>;
+pub type Flash = ParameterMemory<Memory<Vec<u8>>>;
 
-const PAGES: Pages = Pages::new(0, 4 * 1024);
-const ERASED: [u8; 8 * 1024] = [0xFF; 8 * 1024];
+/// The pages of the board (memory.x).
+pub const PAGES: Pages = Pages::new(0, 16 * 1024);
+static ERASED: [u8; 32 * 1024] = [0xFF; 32 * 1024];
+/// The longest time for which the erase of a page stops the core.
+pub const ERASE: Duration = Duration::from_millis(500);
 
 /// A setup with recognisable values.
 #[must_use]
@@ -116,7 +131,8 @@ pub fn intact() -> PowerOn {
 /// When the store cannot be prepared.
 #[must_use]
 pub fn empty_store() -> Flash {
-    Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
+    let view = View::open(Memory(ERASED.to_vec()), PAGES).expect("pages");
+    ParameterMemory::prepare(view, EraseBudget::new(None)).expect("a store")
 }
 
 /// The store job that the node requests; `None` without a request.
@@ -136,37 +152,68 @@ pub fn take_job(protocol: &mut Protocol, now: Instant, out: &mut impl Transmit) 
 /// Carries out the store job of the node at once.
 pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
     if let Some(mut job) = take_job(protocol, now, out) {
-        let result = job.run(store);
+        let result = store.run(&mut job);
+        keep_room(protocol, store, now);
         let _ = protocol.finish(&job, result, now, out);
     }
+}
+
+/// Erases a page if one is used up and a pause disturbs no service, and reports the state of the memory.
+pub fn keep_room<F: NorFlash>(protocol: &mut Protocol, store: &mut ParameterMemory<F>, now: Instant) {
+    if store.can_make_room(now) && protocol.can_pause(ERASE, now) {
+        let _ = store.make_room();
+    }
+    protocol.show_memory(store.state());
 }
 
 impl Bench {
     /// A node that has booted; its boot-up message is already taken.
     #[must_use]
     pub fn booted() -> Bench {
-        Bench::with_flash(ERASED.to_vec())
+        Bench::booted_as(Personality::Pressure)
     }
 
     /// A node of this personality that has booted.
     #[must_use]
     pub fn booted_as(personality: Personality) -> Bench {
-        Bench::start(ERASED.to_vec(), &Setup { personality, ..setup() }, intact())
+        Bench::new_with(&Setup { personality, ..setup() }, intact())
+    }
+
+    /// A node with an empty parameter store.
+    fn new_with(setup: &Setup, power_on: PowerOn) -> Bench {
+        let mut watch = Watch::without_bus();
+        watch.monitor().set_sheet(0, sheet(setup.personality), true);
+        Bench::start(ERASED.to_vec(), setup, power_on, watch)
+    }
+
+    /// A node of this personality and node-ID that has booted.
+    #[must_use]
+    pub fn booted_at(personality: Personality, node_id: u8) -> Bench {
+        let setup = Setup { personality, node_id: NodeId::new(node_id), ..setup() };
+        Bench::new_with(&setup, intact())
+    }
+
+    /// The node-ID, as the number that is added to a function code.
+    #[must_use]
+    pub fn id(&self) -> u16 {
+        self.protocol.node_id().map_or(0, NodeId::get).into()
     }
 
     /// A node that has booted with this content of its parameter pages.
     #[must_use]
     pub fn with_flash(flash: Vec<u8>) -> Bench {
-        Bench::start(flash, &setup(), intact())
+        let mut watch = Watch::without_bus();
+        watch.monitor().set_sheet(0, sheet(setup().personality), false);
+        Bench::start(flash, &setup(), intact(), watch)
     }
 
     /// A node that has booted on a chip whose temperature sensor was not calibrated.
     #[must_use]
     pub fn booted_without_chip_calibration() -> Bench {
-        Bench::start(ERASED.to_vec(), &setup(), PowerOn::default())
+        Bench::new_with(&setup(), PowerOn::default())
     }
 
-    fn start(flash: Vec<u8>, unless_stored: &Setup, power_on: PowerOn) -> Bench {
+    fn start(flash: Vec<u8>, unless_stored: &Setup, power_on: PowerOn, watch: Watch) -> Bench {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
         let Identity { record, fault } = Identity::read(&mut view);
         let setup = record.map_or(*unless_stored, |record| stored_setup(record, unless_stored));
@@ -177,14 +224,23 @@ impl Bench {
             measurement: Measurement::new(setup.personality, &power_on),
             out: Queue::default(),
             now: Instant(0),
-            store: Store::prepare(view).expect("a store"),
+            store: ParameterMemory::prepare(view, EraseBudget::new(None)).expect("a store"),
             encoder: RawEncoder::default(),
             buttons: [false; 2],
             setup: *unless_stored,
             actions: VecDeque::new(),
             has_parameters: true,
             boot_data: fault,
+            watch,
+            due: Instant(0),
+            stores_later: false,
         };
+        bench.protocol.show_memory(bench.store.state());
+        let monitor = bench.watch.monitor();
+        if !monitor.has_sheet(0) {
+            monitor.set_sheet(0, sheet(setup.personality), false);
+        }
+        bench.watch.incident(Instant(0), 0, Incident::PowerOn);
         bench.restart();
         bench.take();
         bench
@@ -194,7 +250,8 @@ impl Bench {
     #[must_use]
     pub fn power_cycled(self) -> Bench {
         let retained = self.measurement.retained();
-        Bench::start(self.store.into_flash().0, &self.setup, PowerOn { retained, ..intact() })
+        let power_on = PowerOn { retained, ..intact() };
+        Bench::start(self.store.into_flash().0, &self.setup, power_on, self.watch)
     }
 
     /// Switches the power off and on, with one bit of the last stored record changed.
@@ -209,16 +266,20 @@ impl Bench {
         // After the last record, which ends with its checksum, come the commit word and the closing mark, four bytes
         // each.
         flash[last - 8] ^= 1;
-        Bench::start(flash, &self.setup, intact())
+        let mut watch = self.watch;
+        watch.incident(self.now, 0, Incident::Injected);
+        Bench::start(flash, &self.setup, intact(), watch)
     }
 
     /// Boots, or boots again after a reset.
     pub fn restart(&mut self) {
-        let next = self.protocol.start(self.now, &mut self.out);
+        self.watch.incident(self.now, 0, Incident::Restart);
         if let Some(fault) = self.boot_data {
             let _ = self.protocol.set_fault(fault, true, self.now);
         }
+        let next = self.protocol.start(self.now, &mut self.out);
         self.keep(next);
+        self.observe();
     }
 
     /// The next action that the node requests from the firmware. Store jobs are already done.
@@ -231,8 +292,54 @@ impl Bench {
     fn keep(&mut self, next: Next) {
         self.has_parameters |= next.parameters;
         match next.action {
-            Some(Action::Store(_)) => run_job(&mut self.protocol, &mut self.store, self.now, &mut self.out),
+            Some(Action::Store(_)) if !self.stores_later => {
+                if let Some(job) = self.begin_store() {
+                    self.end_store(job);
+                }
+            }
+            Some(Action::Store(_)) => (),
             other => self.actions.extend(other),
+        }
+    }
+
+    /// Hands over the store job that waits, if any: its values are those of now.
+    pub fn begin_store(&mut self) -> Option<StoreJob> {
+        take_job(&mut self.protocol, self.now, &mut self.out)
+    }
+
+    /// Carries out a store job.
+    pub fn end_store(&mut self, mut job: StoreJob) {
+        let result = self.store.run(&mut job);
+        keep_room(&mut self.protocol, &mut self.store, self.now);
+        let next = self.protocol.finish(&job, result, self.now, &mut self.out);
+        self.keep(next);
+        self.observe();
+    }
+
+    /// Shows the monitor the frames that the node has sent.
+    fn observe(&mut self) {
+        if self.now > self.due {
+            // The test has let time pass without the node.
+            self.watch.monitor().resume(self.now);
+            self.due = Instant::NEVER;
+        }
+        for frame in std::mem::take(&mut self.out.1) {
+            self.watch.frame(self.now, &frame, Sender::Node(0));
+        }
+        self.probe(None);
+    }
+
+    /// Lets the monitor read values beside the bus, before a request or after an answer.
+    fn probe(&mut self, request: Option<&Frame>) {
+        let Bench { watch, protocol, actions, has_parameters, now, .. } = self;
+        let ask = |request: &Frame, answers: &mut Answers| {
+            let next = protocol.on_service_frame(request, *now, answers);
+            *has_parameters |= next.parameters;
+            actions.extend(next.action);
+        };
+        match request {
+            Some(request) => watch.probe_before(*now, 0, request, ask),
+            None => watch.probe(*now, 0, ask),
         }
     }
 
@@ -255,6 +362,9 @@ impl Bench {
 
     /// Passes a frame to the node, as the acceptance filters do.
     pub fn receive(&mut self, frame: &Frame) {
+        self.observe();
+        self.probe(Some(frame));
+        self.watch.frame(self.now, frame, Sender::Other);
         let is_process = self.protocol.process_ids().any(|id| id == frame.id());
         let is_service = self.protocol.service_ids().any(|id| id == frame.id());
         if is_process {
@@ -267,9 +377,20 @@ impl Bench {
         self.poll();
     }
 
+    /// Shows the monitor a frame that the test passes to the node itself.
+    pub fn overhear(&mut self, frame: &Frame) {
+        self.watch.frame(self.now, frame, Sender::Other);
+    }
+
+    /// Lets the monitor forget what is saved: the test changes the parameter store itself.
+    pub fn forget_saved(&mut self) {
+        self.watch.incident(self.now, 0, Incident::Injected);
+    }
+
     /// An NMT command for this node.
     pub fn nmt(&mut self, command: u8) {
-        self.receive(&Frame::new(0, &[command, ID]).expect("a frame"));
+        let [node_id, _] = self.id().to_le_bytes();
+        self.receive(&Frame::new(0, &[command, node_id]).expect("a frame"));
     }
 
     /// Does all work that is due and returns the next deadline.
@@ -279,7 +400,11 @@ impl Bench {
             let next = self.protocol.poll_services(self.now, &mut self.out);
             self.keep(next);
             if next.action.is_none() {
-                return process.min(next.services);
+                let due = process.min(next.services);
+                self.observe();
+                self.watch.feed(|monitor| monitor.deadline(self.now, 0, due));
+                self.due = due;
+                return due;
             }
         }
     }
@@ -341,11 +466,12 @@ impl Bench {
 /// The SDO channel; the node answers at once or not at all.
 impl Channel for Bench {
     fn send(&mut self, request: [u8; 8]) {
-        self.receive(&Frame::new(0x600 + u16::from(ID), &request).expect("a frame"));
+        self.receive(&Frame::new(0x600 + self.id(), &request).expect("a frame"));
     }
 
     fn received(&mut self) -> Option<[u8; 8]> {
-        let place = self.out.0.iter().position(|frame| frame.id() == 0x580 + u16::from(ID))?;
+        let response = 0x580 + self.id();
+        let place = self.out.0.iter().position(|frame| frame.id() == response)?;
         self.out.0.remove(place).data().try_into().ok()
     }
 

@@ -1,12 +1,14 @@
 //! A node as a station of a network: both halves, the parameter store, and the sensors.
 
 use canopen::{Action, Duration, Frame, Instant, NodeId, Transmit};
-use node::{BitRate, Measurement, Protocol, Setup};
+use monitor::Sheet;
+use node::{BitRate, Measurement, Personality, Protocol, Setup};
 use profiles::board::{DIGITAL_INPUTS, Inputs, RawEncoder, RawSample};
 
 use crate::asked::Asked;
 use crate::bench::{Flash, empty_store, intact, run_job, setup};
 use crate::network::Unit;
+use crate::watch::sheet;
 
 const SAMPLE_PERIOD: Duration = Duration::from_millis(1);
 
@@ -33,6 +35,7 @@ pub struct Station<S> {
     pub measurement: Measurement,
     /// The parameter store.
     pub store: Flash,
+    personality: Personality,
     sensors: S,
     next_sample: Instant,
     asked: Asked,
@@ -57,6 +60,7 @@ impl<S: Sensors> Station<S> {
             protocol: Protocol::new(setup),
             measurement: Measurement::new(setup.personality, &intact()),
             store: empty_store(),
+            personality: setup.personality,
             sensors,
             next_sample: Instant::NEVER,
             asked: Asked::default(),
@@ -105,6 +109,10 @@ impl<S: Sensors> Unit for Station<S> {
 
     fn store(&mut self, now: Instant, out: &mut impl Transmit) {
         run_job(&mut self.protocol, &mut self.store, now, out);
+    }
+
+    fn sheet(&self) -> Option<Sheet> {
+        Some(sheet(self.personality))
     }
 
     fn process_ids(&self) -> Vec<u16> {

@@ -22,9 +22,15 @@ const NO_PROBE: &str = "No debug probes were found";
 pub(crate) struct Flags {
     /// The ELF file of the application [default: the application is built]
     application: Option<PathBuf>,
-    /// Sign with this secret key, and build a bootloader that trusts no other [default: the development key]
+    /// Write a development bootloader: it starts programs that nobody has signed
+    #[arg(long, required_unless_present = "key", conflicts_with = "key")]
+    development: bool,
+    /// Write the bootloader of an owner, which trusts this secret key, and sign with it
     #[arg(long)]
     key: Option<PathBuf>,
+    /// The second key that the bootloader of an owner trusts: the 64 digits of its public half
+    #[arg(long, requires = "key", value_name = "DIGITS")]
+    second_key: Option<String>,
     /// Print what would be written, and the calls of probe-rs, and make none
     #[arg(long)]
     dry_run: bool,
@@ -54,8 +60,14 @@ impl Flags {
         tool.arg("--bootloader").arg(bootloader).arg("--application").arg(application);
         let flags = [("--dry-run", self.dry_run), ("--no-log", self.no_log)];
         tool.args(flags.iter().filter(|(_, is_set)| *is_set).map(|(flag, _)| flag));
+        if self.development {
+            tool.arg("--development");
+        }
         if let Some(key) = &self.key {
             tool.arg("--key").arg(key);
+        }
+        if let Some(key) = &self.second_key {
+            tool.arg("--second-key").arg(key);
         }
         tool.args(self.board.flags());
         tool
@@ -72,7 +84,12 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
         Some(path) => std::path::absolute(path)?,
         None => images::compile_application(&toolchain)?,
     };
-    let bootloader = images::compile_bootloader(&toolchain, flags.key.as_deref().map(variable).transpose()?)?;
+    let mut keys = Vec::new();
+    if let Some(key) = &flags.key {
+        keys.push(variable(key)?);
+    }
+    keys.extend(flags.second_key.clone());
+    let bootloader = images::compile_bootloader(&toolchain, &keys)?;
     become_program(&mut flags.tool(&bootloader, &application))
 }
 

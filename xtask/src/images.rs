@@ -64,13 +64,17 @@ pub(crate) fn compile_application(toolchain: &Toolchain) -> Result<PathBuf> {
     Ok(dir().join("firmware"))
 }
 
-/// Compiles the bootloader alone, for development or with this key as the only trusted key. Returns its path.
-pub(crate) fn compile_bootloader(toolchain: &Toolchain, key: Option<String>) -> Result<PathBuf> {
+/// Compiles the bootloader alone, with these keys as the only trusted keys, or for development without keys. Returns its
+/// path.
+pub(crate) fn compile_bootloader(toolchain: &Toolchain, keys: &[String]) -> Result<PathBuf> {
     let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
-    match key {
-        Some(key) => command.env(KEYS[0], key).env_remove(KEYS[1]),
-        None => command.args(DEVELOPMENT),
-    };
+    for key in KEYS {
+        command.env_remove(key);
+    }
+    command.envs(KEYS.iter().zip(keys));
+    if keys.is_empty() {
+        command.args(DEVELOPMENT);
+    }
     progress::build("bootloader", &mut command)?;
     Ok(dir().join("bootloader"))
 }
@@ -110,7 +114,9 @@ fn compile_guarded(toolchain: &Toolchain) -> Result<PathBuf> {
 
 /// The build of the bootloader in the configuration for an owner.
 fn owners(toolchain: &Toolchain) -> Result<Command> {
+    let published = ["--features", "bootloader/published-keys"];
     let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    command.args(published);
     command.envs(KEYS.into_iter().zip(of_tests("owner-keys.hex")?.lines()));
     Ok(command)
 }
@@ -126,19 +132,31 @@ fn put_beside(build: &mut Command, name: &str) -> Result<PathBuf> {
     Ok(place)
 }
 
-/// Checks both bootloaders of owners, and that the build fails without a key and without the feature for development.
+/// Checks both bootloaders of owners, and that the build fails without a key and with a published key.
 pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
     compile_guarded(toolchain)?;
     compile_owners(toolchain)?;
-    let mut keyless = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    let digits = of_tests("owner-keys.hex")?;
+    let (published, secret) = (digits.lines().next(), of_tests("authorisation-key.hex")?);
+    // Any key that is not published.
+    let own = "42".repeat(32);
+    refuses(toolchain, &[])?;
+    refuses(toolchain, &[(KEYS[0], published.unwrap_or_default())])?;
+    refuses(toolchain, &[(KEYS[0], &own), (KEYS[1], published.unwrap_or_default())])?;
+    refuses(toolchain, &[(KEYS[0], &own), (AUTHORISATION_KEY, secret.trim())])
+}
+
+/// Checks that the bootloader of an owner does not compile with these variables.
+fn refuses(toolchain: &Toolchain, variables: &[(&str, &str)]) -> Result<()> {
+    let mut build = toolchain.cargo("check", &["--release", "-p", "bootloader"]);
     for key in KEYS {
-        keyless.env_remove(key);
+        build.env_remove(key);
     }
-    let refused = keyless.output()?;
-    let says = String::from_utf8_lossy(&refused.stderr);
+    let refused = build.env_remove(AUTHORISATION_KEY).envs(variables.iter().copied()).output()?;
+    let told = String::from_utf8_lossy(&refused.stderr);
     ensure!(
-        !refused.status.success() && says.contains("needs a key of its owner"),
-        "a bootloader that is not for development was built with the development key:\n{says}"
+        !refused.status.success() && told.contains("needs a key of its owner"),
+        "a bootloader that is not for development was built with {variables:?}:\n{told}"
     );
     Ok(())
 }

@@ -10,11 +10,13 @@ mod flash;
 mod fuzz;
 mod hal_examples;
 mod images;
+mod matrix;
 mod mutants;
 mod own_tool;
 mod pictures;
 mod plots;
 mod progress;
+mod regressions;
 mod setup;
 mod sim;
 mod target;
@@ -90,6 +92,10 @@ enum Command {
     Coverage,
     /// Change the code of the pure crates and print the changes that no test notices (docs/evidence.md)
     Mutants(mutants::Flags),
+    /// Bring each mended fault back into a copy of the sources, and expect the monitor to report it (docs/evidence.md)
+    Regressions(regressions::Flags),
+    /// Run the tests of the matrix in full and write their table into docs/evidence.md
+    Matrix,
     /// Print the worst execution time of each task of the firmware, and the latest end of each
     Timing,
     /// Print which code of the images can panic, and why it does not
@@ -141,6 +147,8 @@ fn run(command: Command) -> Result<()> {
         Command::Bench(options) => bench::measure(&options, Tools::ByCargo),
         Command::Coverage => coverage::print(),
         Command::Mutants(flags) => mutants::print(&flags),
+        Command::Regressions(flags) => regressions::run(&flags),
+        Command::Matrix => matrix::write(),
         Command::Timing => timing::print(),
         Command::Panics => callgraph::panics(Tools::ByCargo),
         Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo),

@@ -168,7 +168,7 @@ fn without_a_package_manager_the_packages_are_named() {
 #[test]
 fn who_has_no_probe_rs_is_told_how_to_get_it_and_nothing_is_built() {
     for machine in [Machine::new("no-probe-rs").with("dnf", WORKS), Machine::new("no-manager")] {
-        let output = machine.xtask(&["flash"]);
+        let output = machine.xtask(&["flash", "--development"]);
         let says = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2));
         assert!(says.contains("cargo install --locked probe-rs-tools"), "{says}");
@@ -179,7 +179,7 @@ fn who_has_no_probe_rs_is_told_how_to_get_it_and_nothing_is_built() {
 #[test]
 fn a_board_needs_the_target_too() {
     let machine = Machine::new("no-target").closed().with("dnf", WORKS).with("probe-rs", WORKS);
-    let output = machine.xtask(&["flash", "--dry-run"]);
+    let output = machine.xtask(&["flash", "--development", "--dry-run"]);
     let says = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(says.contains("rustup target add thumbv7em-none-eabihf") && !says.contains("probe-rs"), "{says}");
@@ -191,7 +191,7 @@ fn without_a_board_nothing_is_built() {
     for probe_rs in [empty, FAILS] {
         let machine =
             Machine::new("no-board").with("probe-rs", &format!("[ \"$1\" = --version ] || {probe_rs}"));
-        let output = machine.xtask(&["flash"]);
+        let output = machine.xtask(&["flash", "--development"]);
         let says = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2));
         assert!(says.contains("no debug probe was found") && says.contains("ST-LINK"), "{says}");
@@ -205,7 +205,7 @@ fn without_a_board_nothing_is_built() {
 #[test]
 fn with_a_board_both_programs_are_built() {
     let machine = Machine::new("board").with("probe-rs", "echo '[0]: STLink V2-1'");
-    let says = String::from_utf8(machine.xtask(&["flash"]).stderr).unwrap();
+    let says = String::from_utf8(machine.xtask(&["flash", "--development"]).stderr).unwrap();
     assert!(says.contains("cannot start") && says.contains("flash"), "{says}");
     let calls = machine.calls("cargo");
     let builds = |what: &str| calls.iter().filter(|call| call.contains(what)).count();
@@ -216,7 +216,7 @@ fn with_a_board_both_programs_are_built() {
 #[test]
 fn an_application_that_is_given_is_not_built() {
     let machine = Machine::new("runner").with("probe-rs", WORKS);
-    machine.xtask(&["flash", "firmware"]);
+    machine.xtask(&["flash", "--development", "firmware"]);
     let calls = machine.calls("cargo");
     assert!(calls.iter().any(|call| call.contains("-p bootloader")), "{calls:?}");
     assert!(!calls.iter().any(|call| call.contains("-p firmware")), "{calls:?}");

@@ -5,6 +5,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use crate::reset_cause::ResetCause;
+
 /// Number of words in a copy.
 pub const CAPACITY: usize = 10;
 
@@ -38,6 +40,18 @@ pub enum BackupState {
     Intact(Content),
     /// At least one copy exists, but none is valid.
     Damaged,
+}
+
+impl BackupState {
+    /// The state that counts after a reset with this cause. Without a battery the memory decays in part within a minute:
+    /// the mark may live while the content does not. So after a loss of power, damaged memory is lost memory.
+    #[must_use]
+    pub fn after(self, cause: ResetCause) -> BackupState {
+        match self {
+            BackupState::Damaged if cause.is_power_loss() => BackupState::Nothing,
+            found => found,
+        }
+    }
 }
 
 /// A 32-bit CRC over words, the sequence number first.
@@ -201,6 +215,19 @@ mod tests {
         let mut copies = open(&slots).0;
         (1..=writes).for_each(|number| assert!(copies.write(&content(number))));
         slots
+    }
+
+    #[test]
+    fn damage_after_a_loss_of_power_is_a_loss() {
+        use ResetCause::{BrownOut, IndependentWatchdog, Pin, PowerOn, Software, Unknown};
+        let intact = BackupState::Intact(content(1));
+        for cause in [PowerOn, BrownOut] {
+            assert_eq!(BackupState::Damaged.after(cause), BackupState::Nothing);
+            assert_eq!(intact.after(cause), intact);
+        }
+        for cause in [IndependentWatchdog, Software, Pin, Unknown] {
+            assert_eq!(BackupState::Damaged.after(cause), BackupState::Damaged);
+        }
     }
 
     #[test]

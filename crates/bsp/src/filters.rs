@@ -35,6 +35,14 @@ impl Pair {
     pub const fn exactly(id: u16) -> Pair {
         Pair { id: id & 0x7FF, mask: 0x7FF }
     }
+
+    /// The register of a bank with 16-bit masks: the identifier below the mask. IDE is compared, so that extended
+    /// frames do not pass; RTR is not (RM0390, 30.7.4).
+    #[must_use]
+    pub fn register(self) -> u32 {
+        const IDE: u32 = 1 << 3;
+        (u32::from(self.mask) << 5 | IDE) << 16 | u32::from(self.id) << 5
+    }
 }
 
 /// One filter bank.
@@ -51,11 +59,13 @@ pub type Banks = Vec<Bank, BANKS>;
 
 /// Packs identifiers into banks; identifiers of process data come with a mask of the bits to compare. If they do not
 /// fit, the last bank passes every base frame to FIFO 1 and the protocol sorts the frames out, so no frame is lost.
+/// Process data always fit: see the assertion.
 pub fn pack(process: impl Iterator<Item = (u16, u16)>, services: impl Iterator<Item = u16>) -> Banks {
     let mut banks = Banks::new();
     let process = process.map(|(id, mask)| Pair { id, mask });
-    let complete = fill(&mut banks, Fifo::Process, process)
-        && fill(&mut banks, Fifo::Services, services.map(Pair::exactly));
+    let has_process = fill(&mut banks, Fifo::Process, process) && !banks.is_full();
+    debug_assert!(has_process, "the process data leave no bank for the services");
+    let complete = has_process && fill(&mut banks, Fifo::Services, services.map(Pair::exactly));
     if !complete {
         banks.pop();
         let _ = banks.push(EVERYTHING);

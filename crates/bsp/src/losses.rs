@@ -25,10 +25,12 @@ pub enum Event {
     BackupWrite = 6,
     /// A flash operation that did not end in time; its caller gets an error.
     Flash = 7,
+    /// The CAN controller did not leave the bus in time; it was reset.
+    CanMode = 8,
 }
 
 /// Number of kinds of [`Event`].
-pub const EVENTS: usize = 8;
+pub const EVENTS: usize = 9;
 
 /// The number of lost events of each kind since the start.
 #[derive(Debug, Default)]
@@ -67,13 +69,13 @@ mod tests {
 
     #[test]
     fn each_kind_has_its_own_count() {
-        use Event::{Alarm, BackupWrite, Flash, Frame, Index, Millisecond, Sampling, SsiWord};
-        let kinds = [Frame, Millisecond, Sampling, SsiWord, Index, Alarm, BackupWrite, Flash];
+        use Event::{Alarm, BackupWrite, CanMode, Flash, Frame, Index, Millisecond, Sampling, SsiWord};
+        let kinds = [Frame, Millisecond, Sampling, SsiWord, Index, Alarm, BackupWrite, Flash, CanMode];
         let losses = Losses::new();
         for (n, kind) in (1..).zip(kinds) {
             (0..n).for_each(|_| losses.count(kind));
         }
-        assert_eq!(losses.all(), [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(losses.all(), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
         assert_eq!(kinds.map(|kind| losses.of(kind)), losses.all());
     }
 }

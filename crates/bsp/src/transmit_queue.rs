@@ -9,12 +9,13 @@
 //!   sender keeps the event and offers it again.
 //! * A state ([`Transmit::send_state`]), such as a heartbeat or a measured value, is worthless once there is a newer
 //!   one. The newer frame replaces the older one of its CAN-ID. A node that is kept silent by more urgent frames for
-//!   minutes therefore sends one frame of each CAN-ID in the first gap, and not a queue of old values.
+//!   minutes therefore sends the newest frame of each CAN-ID in the first gap, after the frames that the three mailboxes
+//!   hold, and not a queue of old values.
 //!
 //! The boot-up message is an event before which no other frame may be on the bus, although most CAN-IDs are more
 //! urgent. The queue holds all other frames back until the boot-up message has left its mailbox.
 
-use canopen::{Frame, QueueFull, Transmit};
+use canopen::{CanId, Frame, QueueFull, Transmit};
 use heapless::Vec;
 
 /// Capacity in frames.
@@ -38,6 +39,9 @@ pub trait Mailboxes {
 
     /// Whether all mailboxes are empty: every frame that was taken has been sent.
     fn is_idle(&self) -> bool;
+
+    /// Handles a frame that is on its way out of a mailbox. If the queue was cleared, the frame is discarded.
+    fn settle(&mut self, is_cleared: bool);
 }
 
 /// A waiting frame.
@@ -64,32 +68,44 @@ pub struct TransmitQueue {
     boot_up: BootUp,
     /// The waiting frames; the most urgent one is last.
     waiting: Vec<Waiting, CAPACITY>,
+    /// The queue was cleared since the last look at the mailboxes.
+    is_cleared: bool,
+    /// A PDO was moved into a mailbox since all mailboxes were empty.
+    has_moved_pdo: bool,
 }
 
 impl TransmitQueue {
     /// An empty queue.
     #[must_use]
     pub const fn new() -> TransmitQueue {
-        TransmitQueue { boot_up: BootUp::Sent, waiting: Vec::new() }
+        TransmitQueue { boot_up: BootUp::Sent, waiting: Vec::new(), is_cleared: false, has_moved_pdo: false }
     }
 
     /// Moves frames into the mailboxes until they take no more.
     pub fn pump(&mut self, mailboxes: &mut impl Mailboxes) {
-        while let Some(frame) = self.next(mailboxes) {
-            let offer = mailboxes.offer(&frame);
-            if offer == Offer::Refused {
-                return;
-            }
-            if matches!(self.boot_up, BootUp::Waits(_)) {
-                self.boot_up = BootUp::InMailbox;
-            } else {
-                self.waiting.pop();
-            }
-            if let Offer::Replaced(other) = offer {
-                // The frame just removed has left room for this one.
-                let _ = self.push_first(other);
-            }
+        while self.step(mailboxes) {}
+    }
+
+    /// Moves one frame into a mailbox. Returns whether the mailboxes may take another one now.
+    pub fn step(&mut self, mailboxes: &mut impl Mailboxes) -> bool {
+        mailboxes.settle(core::mem::take(&mut self.is_cleared));
+        self.has_moved_pdo &= !mailboxes.is_idle();
+        let Some(frame) = self.next(mailboxes) else { return false };
+        let offer = mailboxes.offer(&frame);
+        if offer == Offer::Refused {
+            return false;
         }
+        self.has_moved_pdo |= is_pdo(&frame);
+        if matches!(self.boot_up, BootUp::Waits(_)) {
+            self.boot_up = BootUp::InMailbox;
+        } else {
+            self.waiting.pop();
+        }
+        if let Offer::Replaced(other) = offer {
+            // The frame just removed has left room for this one.
+            let _ = self.push_first(other);
+        }
+        !self.waiting.is_empty()
     }
 
     /// The next frame for a mailbox. The boot-up message has all mailboxes for itself.
@@ -110,8 +126,9 @@ impl TransmitQueue {
         self.waiting.is_empty() && !matches!(self.boot_up, BootUp::Waits(_))
     }
 
-    /// Drops all waiting frames.
+    /// Drops all waiting frames, and the frame that is on its way out of a mailbox.
     pub fn clear(&mut self) {
+        (self.is_cleared, self.has_moved_pdo) = (true, false);
         self.waiting.clear();
         self.boot_up = BootUp::Sent;
     }
@@ -169,6 +186,18 @@ impl Transmit for TransmitQueue {
     fn room(&self) -> usize {
         CAPACITY - self.waiting.len()
     }
+
+    fn replaces(&self, id: u16) -> bool {
+        self.waiting.iter().any(|waiting| waiting.is_state && waiting.frame.id() == id)
+    }
+
+    fn has_waiting_pdo(&self) -> bool {
+        self.has_moved_pdo || self.waiting.last().is_some_and(|waiting| is_pdo(&waiting.frame))
+    }
+}
+
+fn is_pdo(frame: &Frame) -> bool {
+    frame.id() <= CanId::LAST_PDO.get()
 }
 
 #[cfg(test)]
@@ -177,24 +206,34 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Mailboxes that behave like bxCAN under its driver: a frame is accepted only if it is more urgent than all
-    /// pending ones. If all mailboxes are full, the least urgent frame gives way.
+    /// Mailboxes that behave like bxCAN under its driver: of equal identifiers one is accepted. If all mailboxes are
+    /// full, the least urgent frame gives way to a more urgent one. The most urgent frame is last.
     #[derive(Default)]
     struct Fake {
         pending: Vec<Frame>,
+        aborted: Option<Frame>,
     }
 
     impl Mailboxes for Fake {
         fn offer(&mut self, frame: &Frame) -> Offer {
-            if self.pending.iter().any(|other| other.id() <= frame.id()) {
+            let is_full = self.pending.len() == 3;
+            if self.pending.iter().any(|other| other.id() == frame.id())
+                || is_full && self.pending[0].id() < frame.id()
+            {
                 return Offer::Refused;
             }
             self.pending.push(*frame);
-            if self.pending.len() <= 3 { Offer::Taken } else { Offer::Replaced(self.pending.remove(0)) }
+            self.pending.sort_by_key(|frame| core::cmp::Reverse(frame.id()));
+            if is_full { Offer::Replaced(self.pending.remove(0)) } else { Offer::Taken }
         }
 
         fn is_idle(&self) -> bool {
             self.pending.is_empty()
+        }
+
+        fn settle(&mut self, is_cleared: bool) {
+            let aborted = self.aborted.take().filter(|_| !is_cleared);
+            self.pending.extend(aborted);
         }
     }
 
@@ -268,7 +307,8 @@ mod tests {
             queue.pump(&mut bus);
         }
         let order = sent(&mut queue, &mut bus);
-        assert_eq!(order, [(0x181, 0), (0x181, 99), (0x701, 99)], "and the one that was in a mailbox");
+        let expected = [(0x181, 0), (0x181, 99), (0x701, 0), (0x701, 99)];
+        assert_eq!(order, expected, "the newest of each, after those that were in a mailbox");
     }
 
     #[test]
@@ -372,6 +412,34 @@ mod tests {
         assert_eq!(bus.pending.len(), 1, "the boot-up message is alone in the mailboxes");
         let order = sent(&mut queue, &mut bus);
         assert_eq!(order, [(0x701, 0), (0x081, 1), (0x181, 1), (0x581, 1)]);
+    }
+
+    #[test]
+    fn a_frame_on_its_way_out_of_a_mailbox_does_not_outlive_a_cleared_queue() {
+        for (clears, expected) in [(false, [(0x181, 7), (0x701, 0)].as_slice()), (true, &[(0x701, 0)])] {
+            let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+            bus.aborted = Some(frame(0x181, 7));
+            if clears {
+                queue.clear();
+            }
+            queue.send_boot_up(frame(0x701, 0)).unwrap();
+            assert_eq!(sent(&mut queue, &mut bus), expected);
+        }
+    }
+
+    #[test]
+    fn frames_with_different_identifiers_share_the_mailboxes() {
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        for id in [0x181, 0x281, 0x381, 0x481] {
+            queue.send(frame(id, 0)).unwrap();
+        }
+        queue.pump(&mut bus);
+        assert_eq!(
+            bus.pending.len(),
+            3,
+            "the TPDOs of a SYNC follow each other without an interrupt between"
+        );
+        assert_eq!(sent(&mut queue, &mut bus), [(0x181, 0), (0x281, 0), (0x381, 0), (0x481, 0)]);
     }
 
     #[test]

@@ -9,6 +9,9 @@ impl CanId {
     /// NMT commands (CiA 301, 7.3.5).
     pub const NMT: CanId = CanId(0x000);
 
+    /// The last CAN-ID of PDOs in the pre-defined connection set (CiA 301, 7.3.5).
+    pub const LAST_PDO: CanId = CanId(0x57F);
+
     /// The function code in an identifier of the pre-defined connection set.
     pub(crate) const FUNCTION: u16 = 0x780;
 
@@ -68,9 +71,13 @@ pub struct CobId {
 impl CobId {
     /// `None` for an extended frame (bit 29) or a CAN-ID of more than 11 bits: this node uses base frames only.
     #[must_use]
-    pub fn parse(value: u32) -> Option<CobId> {
-        let id = CanId::new(u16::try_from(value & 0x3FFF_FFFF).ok()?)?;
-        Some(CobId { id, bit31: value & 1 << 31 != 0, bit30: value & 1 << 30 != 0 })
+    #[allow(clippy::cast_possible_truncation)] // 11 bits.
+    pub const fn parse(value: u32) -> Option<CobId> {
+        let id = value & 0x3FFF_FFFF;
+        if id > 0x7FF {
+            return None;
+        }
+        Some(CobId { id: CanId(id as u16), bit31: value & 1 << 31 != 0, bit30: value & 1 << 30 != 0 })
     }
 
     /// The value as the dictionary stores it.

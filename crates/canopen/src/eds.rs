@@ -138,5 +138,8 @@ fn write_entry(row: &Object, object_type: u8, out: &mut impl Write) -> Result {
     if let Some((low, high)) = row.limits {
         writeln!(out, "LowLimit={low}\nHighLimit={high}")?;
     }
+    if row.flags() != 0 {
+        writeln!(out, "ObjFlags=0x{:X}", row.flags())?;
+    }
     writeln!(out, "PDOMapping={}\n", u8::from(row.mapping != Mapping::No))
 }

@@ -27,6 +27,7 @@ pub mod objects;
 pub mod pdo;
 pub mod sdo;
 mod sync;
+pub mod testing;
 mod time;
 mod transmit;
 

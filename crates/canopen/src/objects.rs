@@ -29,9 +29,9 @@
 pub mod pdo;
 mod program;
 
-use crate::dictionary::{Access, DefaultValue, Group, Object, Type};
+use crate::dictionary::{Access, DefaultValue, Group, Object, Type, fail};
 
-pub use pdo::{rpdo, tpdo};
+pub use pdo::{multiplexed, rpdo, tpdo};
 pub use program::{flash_status, program_control, program_data, program_identification};
 
 /// A read-only value of the device.
@@ -233,8 +233,11 @@ pub const fn dispatching_list<const N: usize>() -> [Object; N] {
 #[must_use]
 pub const fn with<const N: usize>(mut rows: [Object; N], sub: u8, value: i64) -> [Object; N] {
     let mut i = 0;
-    while rows[i].sub != sub || rows[i].index != rows[0].index {
+    while i < N && (rows[i].sub != sub || rows[i].index != rows[0].index) {
         i += 1;
+    }
+    if i == N {
+        fail(rows[0].index, sub, "the object has no such row");
     }
     rows[i] = rows[i].value(value);
     rows

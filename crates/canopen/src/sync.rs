@@ -78,9 +78,9 @@ impl Consumer {
             _ => return Err(WrongLength),
         };
         let Settings { period, window, .. } = self.settings;
-        self.window_end = if window == 0 { Instant::NEVER } else { now + Duration(window.into()) };
+        self.window_end = if window == 0 { Instant::NEVER } else { now.plus(Duration(window.into())) };
         // A SYNC that is half a period late is missing.
-        self.due = if period == 0 { Instant::NEVER } else { now + Duration(u64::from(period) * 3 / 2) };
+        self.due = if period == 0 { Instant::NEVER } else { now.plus(Duration(u64::from(period) * 3 / 2)) };
         Ok(Sync { counter })
     }
 

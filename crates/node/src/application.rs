@@ -1,18 +1,22 @@
 //! The application of the CANopen device: the additions of the node to CiA 301, and its profile.
 
-use canopen::dictionary::{Entry, Group, Groups};
+use canopen::dictionary::{Entry, Group, Groups, is_packed};
 use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, ErrorClass, Part, Soundness};
-use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL};
+use profiles::communication::{
+    LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL,
+};
 use profiles::fault::Flags;
+use profiles::lift::objects::{SWITCHED_OFF, UNKNOWN_CHOICES};
 use profiles::{AnyProfile, Snapshot};
 use update::Authorisation;
 
 use crate::Setup;
 use crate::configured::Configured;
 use crate::fault::{CONDITIONS, flag_of};
+use crate::memory::MemoryState;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
 use crate::trial::ProgramTrial;
@@ -31,6 +35,8 @@ pub(crate) struct NodeApplication {
     /// The flags of active faults. A reset of the dictionary does not end a fault.
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
+    /// Room and wear of the parameter memory (2010h).
+    pub(crate) memory: MemoryState,
     /// Counters of lost events, as counted by the firmware (2001h).
     pub(crate) lost_events: [u32; LOST_EVENTS],
     pub(crate) trial: ProgramTrial,
@@ -48,6 +54,7 @@ impl NodeApplication {
             snapshot: Snapshot::default(),
             flags: Flags::default(),
             stored: Stored::NOTHING,
+            memory: MemoryState::UNKNOWN,
             lost_events: [0; LOST_EVENTS],
             trial: ProgramTrial::default(),
             authorisation: Authorisation::default(),
@@ -68,6 +75,22 @@ impl NodeApplication {
     /// Shows the personality of the next start.
     pub(crate) fn show_personality(&self, image: &mut [u8]) {
         self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
+    }
+
+    /// Shows room and wear of the parameter memory.
+    pub(crate) fn show_memory(&self, image: &mut [u8]) {
+        let MemoryState { erases, erases_allowed, .. } = self.memory;
+        self.show(PARAMETER_MEMORY, 1, &self.memory.accepted().to_le_bytes(), image);
+        self.show(PARAMETER_MEMORY, 2, &erases.to_le_bytes(), image);
+        self.show(PARAMETER_MEMORY, 3, &[erases_allowed], image);
+    }
+
+    /// Communication parameters that a firmware without 2307h has stored: TPDOs that were off stay off.
+    fn adopt_older_choice(&self, image: &mut [u8]) {
+        let packed = self.stored.get(Group::Communication).packed;
+        if !packed.is_empty() && !is_packed(packed, SWITCHED_OFF, 0) {
+            self.show(SWITCHED_OFF, 0, &[UNKNOWN_CHOICES], image);
+        }
     }
 
     pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
@@ -97,10 +120,13 @@ impl Application for NodeApplication {
         show(0x1F56, 1, &setup.program_id.to_le_bytes());
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
         show(0x1F57, 1, &status.to_le_bytes());
-        self.profile.initialise(image);
+        self.adopt_older_choice(image);
+        let is_stored = !self.stored.get(Group::Communication).packed.is_empty();
+        self.profile.initialise(image, is_stored);
         self.show_personality(image);
         self.show_flags(image);
         self.show_lost_events(image);
+        self.show_memory(image);
         self.show_trial(image);
         self.show_authorisation(image);
         self.show_values(image);
@@ -109,7 +135,6 @@ impl Application for NodeApplication {
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         match entry.index() {
             PROGRAM_TRIAL => {
-                self.admit()?;
                 let is_at_work = self.has_measured();
                 self.trial.command(bytes, is_at_work)
             }
@@ -151,6 +176,11 @@ impl Application for NodeApplication {
         stores.then_some(Groups::one(Group::Application))
     }
 
+    /// A program on trial stores nothing, because the previous program has to find its settings.
+    fn can_store(&self) -> Result<(), Abort> {
+        if self.trial.is_open() { Err(Abort::DeviceState) } else { self.memory.check() }
+    }
+
     fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {
         self.profile.begin_events(tpdo, image);
     }
@@ -180,8 +210,8 @@ impl Application for NodeApplication {
         self.flags.set(flag_of(group), !good);
     }
 
-    fn stop_program(&mut self) -> Result<(), Abort> {
-        self.admit()
+    fn admits(&self, entry: &Entry) -> Result<(), Abort> {
+        self.admit(entry.index(), entry.sub())
     }
 
     fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {

@@ -1,12 +1,23 @@
 //! 2003h: permission to change the program (docs/update.md). If the bootloader has a key, a client must answer the
 //! challenge of this start.
 
+use canopen::dictionary::{Group, Groups};
 use canopen::sdo::Abort;
-use profiles::communication::PROGRAM_AUTHORISATION;
+use profiles::communication::{PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL};
 use update::Authorisation;
 
 use crate::Protocol;
 use crate::application::NodeApplication;
+
+/// Whether a write decides which program runs, or what is confirmed. Restored defaults and another personality change the
+/// times of the trial (2002h).
+fn has_effect_on_program(index: u16, sub: u8) -> bool {
+    match index {
+        0x1011 => Groups::of_sub(sub).is_some_and(|groups| groups.contains(Group::Application)),
+        0x1F51 | PERSONALITY | PROGRAM_TRIAL => true,
+        _ => false,
+    }
+}
 
 impl Protocol {
     /// Takes the authorisation that the bootloader has left. To be called before the start.
@@ -16,9 +27,10 @@ impl Protocol {
 }
 
 impl NodeApplication {
-    /// Refuses a change of the program until the challenge has been answered.
-    pub(crate) fn admit(&self) -> Result<(), Abort> {
-        if self.authorisation.is_open() { Ok(()) } else { Err(Abort::DeviceState) }
+    /// Refuses a write that has an effect on the program until the challenge has been answered.
+    pub(crate) fn admit(&self, index: u16, sub: u8) -> Result<(), Abort> {
+        let is_free = self.authorisation.is_open() || !has_effect_on_program(index, sub);
+        if is_free { Ok(()) } else { Err(Abort::DeviceState) }
     }
 
     /// Handles a write to 2003h:3.

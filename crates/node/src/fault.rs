@@ -1,8 +1,8 @@
 //! All faults of the node: its own and those of the profiles. Faults of the communication belong to the device
 //! ([`canopen::Fault`]).
 
-use canopen::Condition;
 use canopen::dictionary::Group;
+use canopen::{Condition, ErrorClass};
 use profiles::fault::{Fault, Flags, count, gather};
 
 const fn fault(name: &'static str, code: u16, flags: Flags) -> Fault {
@@ -27,7 +27,7 @@ const OLDER_HOLDS: u8 = 1;
 const DEFAULTS_HOLD: u8 = 2;
 
 const fn with_detail(name: &'static str, holds: u8) -> Fault {
-    let condition = Condition { code: 0x6301, register: 0, detail: [holds, 0, 0, 0, 0] };
+    let condition = Condition { detail: [holds, 0, 0, 0, 0], ..Condition::new(0x6301) };
     Fault { name, condition, flags: Flags::system(3) }
 }
 
@@ -39,14 +39,16 @@ const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 /// All faults, in the order of their numbers ([`canopen::Fault::Application`]).
 pub static FAULTS: [Fault; count(LISTS)] = gather(LISTS);
 
-/// The faults with their error codes, in the same order.
+/// The faults as the device treats them, in the same order. Object 1029h:2 applies to every fault with a flag.
 #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 pub(crate) const CONDITIONS: [Condition; count(LISTS)] = {
     let faults: [Fault; count(LISTS)] = gather(LISTS);
     let mut conditions = [Condition::new(0); count(LISTS)];
     let mut i = 0;
     while i < conditions.len() {
-        conditions[i] = faults[i].condition;
+        let Fault { condition, flags, .. } = faults[i];
+        let has_flag = flags.sensor | flags.system != 0;
+        conditions[i] = if has_flag { condition.of_class(ErrorClass::DEVICE) } else { condition };
         i += 1;
     }
     conditions

@@ -2,13 +2,16 @@
 
 use canopen::dictionary::Group;
 use heapless::{Vec, VecView};
-use storage::GroupNumber;
+use storage::{DeviceRecord, GroupNumber};
 
 const COMMUNICATION: usize = profiles::packed_size(Group::Communication);
 const APPLICATION: usize = profiles::packed_size(Group::Application);
 const CALIBRATION: usize = profiles::packed_size(Group::Calibration);
 const _: () = assert!(COMMUNICATION <= storage::MAX_VALUE && APPLICATION <= storage::MAX_VALUE);
 const _: () = assert!(CALIBRATION <= storage::MAX_VALUE);
+
+/// The longest values of the parameter store in bytes, by group number.
+pub(crate) const LONGEST: [usize; 4] = [DeviceRecord::ROOM, COMMUNICATION, APPLICATION, CALIBRATION];
 
 /// The packed values of every group, with room for the largest dictionary. Empty values are all zeros, so the initial
 /// value needs no copy in flash.

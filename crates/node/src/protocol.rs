@@ -1,12 +1,13 @@
 //! The protocol half: the CANopen device and its state.
 
+use canopen::lss::BitRate;
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::board::Outputs;
 use profiles::{Parameters, ROOM, Snapshot};
 
 use crate::application::NodeApplication;
-use crate::faults::Shown;
+use crate::faults::{Shown, present};
 use crate::{Next, Setup};
 
 /// Samples that may have been taken with the old parameters: the sample of this millisecond may have been taken, and
@@ -18,7 +19,7 @@ const OLDER_SAMPLES: u8 = 3;
 #[derive(Debug)]
 pub struct Protocol {
     pub(crate) device: canopen::device!(NodeApplication, room: ROOM),
-    /// The faults shown by the last snapshot: most samples change none.
+    /// The faults of the profile that are reported: most samples change none.
     pub(crate) shown: Shown,
     /// The job of the last `Action::Store`, until it is taken.
     pub(crate) job: Option<Job>,
@@ -54,6 +55,11 @@ impl Protocol {
             self.job = Some(job);
         }
         next
+    }
+
+    /// Reports the bit rate at which the bus runs: process data take three quarters of it at most.
+    pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.device.set_bus_bit_rate(bit_rate);
     }
 
     /// The node-ID in use; `None` while the node waits for LSS to assign one.
@@ -95,18 +101,22 @@ impl Protocol {
     }
 
     /// Copies the values of the last millisecond into the dictionary, and sends the PDOs that their change triggers and
-    /// the process data that is due. Without a snapshot only due process data is sent.
+    /// the process data that is due. Without a snapshot only due process data is sent. When a job of `take_job` no longer
+    /// waits for samples, the services are due at once.
     pub fn publish(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let snapshot = &self.device.application().snapshot;
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
+        let was_waiting = self.older_samples > 0;
         self.older_samples = self.older_samples.saturating_sub(1);
-        let shown = Shown::of(snapshot);
-        if self.shown != shown {
-            self.follow_faults(shown, now);
+        let changed = self.shown.update(present(snapshot));
+        if changed != 0 {
+            self.follow_faults(changed, now);
         }
-        self.device.publish(now, out, NodeApplication::show_values)
+        let next = self.device.publish(now, out, NodeApplication::show_values);
+        let can_store = was_waiting && self.older_samples == 0 && self.job.is_some();
+        if can_store { Next { services: now, ..next } } else { next }
     }
 
     /// Handles expired PDO and SYNC timers.

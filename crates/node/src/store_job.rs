@@ -43,8 +43,7 @@ impl StoreJob {
     /// Does the whole job or nothing. The time depends on the flash: some 16 us a word.
     ///
     /// # Errors
-    /// The abort code for the client: `Hardware` if the flash has failed, `DeviceState` if there is no room left until
-    /// the node is restarted.
+    /// The abort code for the client: `Hardware` if the flash has failed, `DeviceState` if there is no room left.
     pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
         self.pack();
         if let Some(Job::Configure(_) | Job::Setting(_)) = self.job {
@@ -76,7 +75,7 @@ impl StoreJob {
 
 fn abort_of<E>(error: &Error<E>) -> Abort {
     match error {
-        Error::RestartNeeded => Abort::DeviceState,
+        Error::Full => Abort::DeviceState,
         _ => Abort::Hardware,
     }
 }

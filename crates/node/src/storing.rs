@@ -38,7 +38,7 @@ impl Protocol {
     /// long.
     ///
     /// Values that the measurement determines, such as the offset of a preset, are stored too. While such values may be
-    /// older than the parameters, the job waits: ask again a few milliseconds later.
+    /// older than the parameters, the job waits: [`publish`](Protocol::publish) makes the services due when to ask again.
     pub fn take_job(&mut self, taken: &mut StoreJob) -> bool {
         let application = self.device.application();
         let is_measured = !matches!(application.snapshot, Snapshot::Nothing);

@@ -47,10 +47,15 @@ impl ProgramTrial {
     fn state(&self) -> u8 {
         match self.state {
             Trial::None => 0,
-            Trial::Open | Trial::Lost(_) => 1,
+            Trial::Begun | Trial::Open | Trial::Lost(_) => 1,
             Trial::Over(Reason::Starts) => 2,
             Trial::Over(Reason::Withdrawn) => 3,
         }
+    }
+
+    /// Whether the program is still on trial.
+    pub(crate) fn is_open(&self) -> bool {
+        self.state == Trial::Open
     }
 
     /// Why the previous program was restored, in the codes of 1F57h; `None` if it was not.
@@ -85,7 +90,7 @@ impl Protocol {
     /// so that it finds its settings.
     #[must_use]
     pub fn is_on_trial(&self) -> bool {
-        self.device.application().trial.state == Trial::Open
+        self.device.application().trial.is_open()
     }
 
     /// Whether the previous program was restored, for a fault on the bus.
@@ -95,12 +100,14 @@ impl Protocol {
     }
 
     /// Takes note of a frame from a master: an NMT command, a request to the SDO server, or a monitored heartbeat.
-    /// Frames for other nodes do not arrive here.
+    /// Frames for other nodes do not arrive here. With a key (2003h), frames count once its holder has answered the
+    /// challenge.
     pub(crate) fn note_master(&mut self, frame: &Frame) {
         const FUNCTION: u16 = 0x780;
         let function = frame.id() & FUNCTION;
+        let application = self.device.application_mut();
         if frame.id() == CanId::NMT.get() || matches!(function, 0x600 | 0x700) {
-            self.device.application_mut().trial.is_addressed = true;
+            application.trial.is_addressed |= application.authorisation.is_open();
         }
     }
 

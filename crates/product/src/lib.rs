@@ -16,6 +16,6 @@ pub const fn code(personality: u8) -> u32 {
     personality as u32 + 1
 }
 
-/// Product code in the bootloader and in the header of an image. An image has all personalities, so this code
-/// identifies the board; it is that of the first personality.
-pub const BOARD: u32 = code(0);
+/// Board code, 2004h:1 and in the header of an image. An image has all personalities, so it is made for a board and not
+/// for a product. Boards that cannot run each other's images need different codes.
+pub const BOARD: u32 = 0x0446_0001;

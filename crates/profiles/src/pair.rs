@@ -57,9 +57,9 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         Pair(A::new(first), B::new(second))
     }
 
-    fn initialise(&mut self, image: &mut [u8]) {
-        self.0.initialise(image);
-        self.1.initialise(image);
+    fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
+        self.0.initialise(image, is_stored);
+        self.1.initialise(image, is_stored);
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters<Self> {

@@ -56,8 +56,8 @@ pub trait Profile: Sized {
     fn new(fields: &'static Self::Fields) -> Self;
 
     /// Fills in the values that the table cannot have, after every reset: those that depend on the identity and on the
-    /// parameters.
-    fn initialise(&mut self, _image: &mut [u8]) {}
+    /// parameters. `is_stored`: the communication parameters in the image were stored by a client, and are no defaults.
+    fn initialise(&mut self, _image: &mut [u8], _is_stored: bool) {}
 
     /// The parameters in the image. An impossible value acts as a valid one.
     fn parameters(&self, image: &[u8]) -> Parameters<Self>;

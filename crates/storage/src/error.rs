@@ -13,8 +13,8 @@ pub enum Error<E> {
     BufferTooSmall,
     /// A value is longer than [`crate::MAX_VALUE`], or all groups together would not fit an empty page.
     TooLong,
-    /// Both pages are used up. Nothing is lost; the next start-up erases one of them, and saving works again.
-    RestartNeeded,
+    /// Both pages are used up. Nothing is lost; after [`Store::make_room`](crate::Store::make_room) saving works again.
+    Full,
     /// The flash does not hold the data that was read or written before: a worn-out or disturbed cell.
     Corrupt,
 }
@@ -26,7 +26,7 @@ impl<E: fmt::Debug> fmt::Display for Error<E> {
             Error::Geometry => f.write_str("the parameter pages do not fit the flash"),
             Error::BufferTooSmall => f.write_str("the buffer is shorter than the stored value"),
             Error::TooLong => f.write_str("the values do not fit a page"),
-            Error::RestartNeeded => f.write_str("both pages are used up, a restart erases one"),
+            Error::Full => f.write_str("both pages are used up, one has to be erased"),
             Error::Corrupt => f.write_str("the flash does not hold what was written"),
         }
     }

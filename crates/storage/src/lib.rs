@@ -10,7 +10,7 @@
 //!
 //! let pages = Pages::new(0, 16 * 1024);
 //! let flash = Memory(vec![0xFF; 32 * 1024]);
-//! let mut store = Store::prepare(View::open(flash, pages)?)?; // start-up: may erase
+//! let mut store = Store::prepare(View::open(flash, pages)?)?; // at start-up, because it may erase
 //! let value = &[1, 2, 3];
 //! store.save(&[
 //!     Change::Set { group: GroupNumber::Three, version: 1, value },
@@ -25,24 +25,28 @@
 //! # Timing
 //!
 //! A single-bank flash stops the core during an operation: 16 us for a word (100 us at most), 0.25 s for the erase of a
-//! page. Erasing is therefore left to [`Store::prepare`] at start-up, before the node goes on the bus, and a save only
-//! programs.
+//! page (0.5 s at most). A save therefore only programs. A page is erased by [`Store::prepare`] at start-up, before the
+//! node goes on the bus, and by [`Store::make_room`], which the caller calls when a pause of the core disturbs nobody.
 //!
 //! `save` simply blocks and belongs in the lowest-priority task. All other tasks preempt it between two words: a 1 kHz
 //! sampling task starts late by one word at most and then runs at full speed, because nothing is programmed meanwhile.
 //! Handing the words one by one to a scheduler would have the same effect, with more state and more possible errors.
 //! The caller copies the values before the call, so no lock is held during the save.
 //!
-//! If neither page has room, `save` returns [`Error::RestartNeeded`] and changes nothing. A start leaves at least one
-//! empty page, so at least a page of saves fits between two starts. The table is for pages of 16 KiB and 10,000 erase
+//! If neither page has room, `save` returns [`Error::Full`] and changes nothing. [`Store::saves_left`] gives the number of
+//! saves that certainly succeed, so that a caller can refuse a request before its effect. A start leaves at least one
+//! empty page, so at least a page of saves fits between two erases. The table is for pages of 16 KiB and 10,000 erase
 //! cycles (`tests/store/figures.rs` computes it; the first two rows are for the pressure transmitter). Values that are
 //! already stored are not programmed again, so saving unchanged parameters costs nothing:
 //!
-//! | saved at once | saves from empty pages on | saves until worn out | words of one save |
+//! | saved at once | saves without an erase, two empty pages | saves until worn out | words of one save |
 //! |---|---|---|---|
 //! | application group of 212 bytes | 136 | 1,360,000 | 60, 1.0 ms |
 //! | communication and application groups, 1405 bytes | 22 | 220,000 | 362, 5.8 ms |
 //! | all four groups of [`MAX_VALUE`] bytes | 2 | 20,000 | 2064, 33 ms |
+//!
+//! [`Store::moves`] counts the erases. The number is stored in the pages, so a power cut does not lose it. Between two
+//! erases each word is programmed once: the erases alone wear the flash.
 //!
 //! # Format
 //!
@@ -89,7 +93,7 @@
 //! marks the old page *left*. A page whose first transaction cannot be read or is not closed does not count while the
 //! page before it exists.
 //!
-//! **Start-up.** `prepare` erases the page that is not in use. If the page in use is damaged, or ends with anything but
+//! **Erase.** `prepare` and `make_room` erase the page that is not in use. If the page in use is damaged, or ends with anything but
 //! a closed transaction and erased words, its state is first moved to the other page, and then it is erased. Nothing is
 //! therefore ever appended to doubtful words, and a commit word that reads well by chance is decided once and for all.
 //!

@@ -115,7 +115,12 @@ impl Scan {
         Ok(())
     }
 
-    fn take<F: ReadNorFlash>(&mut self, flash: &mut F, transaction: &Transaction) -> Result<(), F::Error> {
+    /// Takes the next transaction, which is complete.
+    pub(crate) fn take<F: ReadNorFlash>(
+        &mut self,
+        flash: &mut F,
+        transaction: &Transaction,
+    ) -> Result<(), F::Error> {
         if transaction.at == self.page.format.first() {
             self.first = if transaction.closed { First::Closed } else { First::Open };
         }

@@ -1,4 +1,4 @@
-//! Saving: transactions, the move to the other page, and the erase at start-up.
+//! Saving: transactions, the move to the other page, and the erase of the page that is not in use.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -20,6 +20,7 @@ pub const MAX_VALUE: usize = 2048;
 #[derive(Debug)]
 pub struct Store<F> {
     view: View<F>,
+    erases: u32,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -28,9 +29,18 @@ impl<F: NorFlash> Store<F> {
         &mut self.view.flash
     }
 
-    /// Makes the store ready for saving: erases the page that is not in use, unless it is erased already. If the page
-    /// in use was cut or damaged, its readable data is first moved to the other page. Nothing is therefore ever
-    /// appended to doubtful words, and the values read at this start are final.
+    /// Makes the store ready for saving, with as many erases as it needs: see [`prepare_within`](Store::prepare_within).
+    ///
+    /// # Errors
+    /// Errors of [`prepare_within`](Store::prepare_within).
+    pub fn prepare(view: View<F>) -> Result<Store<F>, Error<F::Error>> {
+        Store::prepare_within(view, u32::MAX)
+    }
+
+    /// Makes the store ready for saving with at most this many erases: erases the page that is not in use, unless it is
+    /// erased already. If the page in use was cut or damaged, its readable data is first moved to the other page.
+    /// Nothing is therefore ever appended to doubtful words, and the values read at this start are final. If `erases` is too
+    /// small, the store can be [full](Error::Full) until [`make_room`](Store::make_room).
     ///
     /// To be called at start-up, before the node goes on the bus: an erase of 16 KiB stops a single-bank flash for
     /// 0.25 s, and there can be two. Most starts erase nothing.
@@ -38,30 +48,88 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`Error::Flash`]; [`Error::Corrupt`] if a page cannot be erased or programmed; [`Error::Geometry`] if the flash
     /// cannot erase the pages separately, or programs other words than [`Pages`] says.
-    pub fn prepare(view: View<F>) -> Result<Store<F>, Error<F::Error>> {
+    pub fn prepare_within(view: View<F>, erases: u32) -> Result<Store<F>, Error<F::Error>> {
         if !view.pages.suits(F::WRITE_SIZE) {
             return Err(Error::Geometry);
         }
-        let pages = view.pages.split(view.flash.capacity(), F::ERASE_SIZE)?;
-        let mut store = Store { view };
-        for page in pages {
-            if store.is_spare(page) && !store.is_clean(page) {
-                store.erase(page)?;
-            }
-        }
-        let old = *store.current();
-        if old.generation.is_some() && !old.can_grow() {
-            store.move_on(&store.existing())?;
-            store.erase(old.page)?;
+        view.pages.split::<F::Error>(view.flash.capacity(), F::ERASE_SIZE)?;
+        let mut store = Store { view, erases: 0 };
+        store.leave_doubtful()?;
+        while store.erases < erases && store.needs_room() {
+            store.make_room()?;
         }
         Ok(store)
+    }
+
+    /// Whether a page that is not in use has to be erased before it can be used again.
+    #[must_use]
+    pub fn needs_room(&self) -> bool {
+        self.used_up().is_some()
+    }
+
+    /// Erases a page that is not in use, if there is one to be erased: see [`needs_room`](Store::needs_room). Stops a
+    /// single-bank flash for 0.25 s, 0.5 s at most (16 KiB).
+    ///
+    /// # Errors
+    /// [`Error::Flash`]; [`Error::Corrupt`] if a page cannot be erased or programmed.
+    pub fn make_room(&mut self) -> Result<(), Error<F::Error>> {
+        if let Some(page) = self.used_up() {
+            self.erase(page)?;
+        }
+        self.leave_doubtful()
+    }
+
+    /// Number of erases since [`prepare`](Store::prepare).
+    #[must_use]
+    pub fn erases(&self) -> u32 {
+        self.erases
+    }
+
+    /// How often the store has moved to the other page, since the pages were new. Counted in the pages themselves, modulo
+    /// 65,536. Every move costs one erase, so each of the two pages has been erased half as often.
+    #[must_use]
+    pub fn moves(&self) -> u16 {
+        self.current().generation.unwrap_or(0)
+    }
+
+    /// Number of saves that certainly succeed before [`make_room`](Store::make_room), if the values have at most these
+    /// lengths in bytes, group by group, and if each save changes all groups. Saves of fewer or shorter values cost less.
+    /// Each is counted with a save of the first group alone beside it, the device record.
+    #[must_use]
+    pub fn saves_left(&self, longest: &[usize; 4]) -> u32 {
+        let format = self.format();
+        let frame = format.head() + format.tail();
+        let record =
+            |len: &usize| format.record_head() + format.body(u32::try_from(*len).unwrap_or(u32::MAX));
+        let [device, ..] = longest;
+        let whole = frame + longest.iter().map(record).sum::<u32>();
+        let cost = whole + frame + record(device);
+        let fits = |room: u32| room.checked_div(cost).unwrap_or(0);
+        let Scan { page, end, generation, .. } = *self.current();
+        let here =
+            if generation.is_some() && self.current().can_grow() { page.size.saturating_sub(end) } else { 0 };
+        // The first transaction of a page has all groups, whatever its save changes.
+        let there = if self.other().clean { page.room().saturating_sub(whole) } else { 0 };
+        fits(here) + fits(there)
+    }
+
+    /// The page that is not in use, unless it is clean.
+    fn used_up(&self) -> Option<Page> {
+        let pages = [self.current().page, self.other().page];
+        pages.into_iter().find(|page| self.is_spare(*page) && !self.is_clean(*page))
+    }
+
+    /// Moves away from a page that was cut or damaged, if the other page is clean.
+    fn leave_doubtful(&mut self) -> Result<(), Error<F::Error>> {
+        let is_doubtful = self.current().generation.is_some() && !self.current().can_grow();
+        if is_doubtful && self.other().clean { self.move_on(&self.existing()) } else { Ok(()) }
     }
 
     /// Makes all `changes` or none. The last of several changes to one group counts; values that are already stored are
     /// not written again. Only programs words, about 16 us each, and never erases.
     ///
     /// # Errors
-    /// [`Error::TooLong`] and [`Error::RestartNeeded`]: nothing was changed. [`Error::Flash`] and [`Error::Corrupt`]:
+    /// [`Error::TooLong`] and [`Error::Full`]: nothing was changed. [`Error::Flash`] and [`Error::Corrupt`]:
     /// the flash has failed; [`Store::load`] returns the state of the groups, all old or all new.
     pub fn save(&mut self, changes: &[Change<'_>]) -> Result<(), Error<F::Error>> {
         if changes.is_empty() {
@@ -85,7 +153,7 @@ impl<F: NorFlash> Store<F> {
         } else if self.other().clean {
             self.move_on(&whole)
         } else {
-            Err(Error::RestartNeeded)
+            Err(Error::Full)
         }
     }
 
@@ -199,7 +267,8 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Writes a transaction, then reads the pages again, so that the state in RAM always agrees with the flash.
+    /// Writes a transaction, then reads it again, so that the state in RAM always agrees with the flash. A page that comes
+    /// into use, and a page after an error, are read as a whole.
     fn write(
         &mut self,
         page: Page,
@@ -208,7 +277,11 @@ impl<F: NorFlash> Store<F> {
         records: &Records<'_>,
     ) -> Result<(), Error<F::Error>> {
         let written = Writer::new(&mut self.view.flash, page, at).transaction(generation, records);
-        self.view.refresh()?;
+        if written.is_ok() && page == self.current().page {
+            self.view.take_appended(at)?;
+        } else {
+            self.view.reread(page)?;
+        }
         written?;
         let Scan { page: current, end, tidy, .. } = *self.current();
         if current == page && end == at + size(records, page.format) && tidy {
@@ -220,9 +293,10 @@ impl<F: NorFlash> Store<F> {
 
     /// Erases a page and marks it clean; without the mark the erase may have been cut.
     fn erase(&mut self, page: Page) -> Result<(), Error<F::Error>> {
+        self.erases = self.erases.saturating_add(1);
         self.view.flash.erase(page.start, page.start + page.size)?;
         Writer::new(&mut self.view.flash, page, 0).program(CLEAN)?;
-        self.view.refresh()?;
+        self.view.reread(page)?;
         if self.is_clean(page) { Ok(()) } else { Err(Error::Corrupt) }
     }
 }

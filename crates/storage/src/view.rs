@@ -6,7 +6,7 @@ use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::WORD;
 use crate::group::{GroupNumber, Health, Loaded, PerGroup};
-use crate::page::Pages;
+use crate::page::{Page, Pages};
 use crate::scan::{Content, Entry, First, Scan, Slot};
 
 /// The store for start-up code and host tools: read only.
@@ -106,9 +106,28 @@ impl<F: ReadNorFlash> View<F> {
         Ok(true)
     }
 
-    /// Reads both pages again after a write.
-    pub(crate) fn refresh(&mut self) -> Result<(), Error<F::Error>> {
-        self.state = State::read(&mut self.flash, self.pages)?;
+    /// Takes the transaction that was appended at this place of the page in use. If it is not complete, the page is read
+    /// again.
+    pub(crate) fn take_appended(&mut self, at: u32) -> Result<(), Error<F::Error>> {
+        let current = &mut self.state.current;
+        let appended = current.page.transaction(&mut self.flash, at)?;
+        match appended.filter(|appended| appended.closed && at == current.end) {
+            Some(appended) => {
+                current.take(&mut self.flash, &appended)?;
+                self.state.merge();
+                Ok(())
+            }
+            None => self.reread(self.state.current.page),
+        }
+    }
+
+    /// Reads a page again after a write or an erase. The other page has not changed.
+    pub(crate) fn reread(&mut self, page: Page) -> Result<(), Error<F::Error>> {
+        let fresh = Scan::of(&mut self.flash, page)?;
+        let State { current, other, .. } = self.state;
+        let rest = if current.page == page { other } else { current };
+        self.state =
+            if page.start < rest.page.start { State::of(fresh, rest) } else { State::of(rest, fresh) };
         Ok(())
     }
 }
@@ -116,9 +135,19 @@ impl<F: ReadNorFlash> View<F> {
 impl State {
     fn read<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Result<State, Error<F::Error>> {
         let [first, second] = pages.split(flash.capacity(), WORD as usize)?;
-        let (current, other) = arrange(Scan::of(flash, first)?, Scan::of(flash, second)?);
-        let groups = PerGroup::from_fn(|group| merge(&current, &other, group));
-        Ok(State { current, other, groups })
+        Ok(State::of(Scan::of(flash, first)?, Scan::of(flash, second)?))
+    }
+
+    /// The state from the first and the second page.
+    fn of(first: Scan, second: Scan) -> State {
+        let (current, other) = arrange(first, second);
+        let mut state = State { current, other, groups: PerGroup::default() };
+        state.merge();
+        state
+    }
+
+    fn merge(&mut self) {
+        self.groups = PerGroup::from_fn(|group| merge(&self.current, &self.other, group));
     }
 }
 

@@ -37,6 +37,11 @@ impl Area {
         size
     }
 
+    /// Sizes of the sectors in bytes.
+    pub(crate) const fn sizes(&self) -> &'static [u32] {
+        self.sectors
+    }
+
     /// Offset of the first byte after the area.
     #[must_use]
     pub const fn end(&self) -> u32 {

@@ -44,7 +44,7 @@ pub enum Decision {
     /// A checked image waits in staging: call [`crate::Updater::install`], then ask again. If the answer is the same
     /// again, the copy has failed: stay with [`crate::Updater::status`].
     Copy,
-    /// The application has lost its trial: call [`crate::Updater::revert`], then ask again.
+    /// The application has lost its trial, or has not been restored completely: call [`crate::Updater::revert`], then ask again.
     Revert,
     /// Stay in the bootloader.
     Stay(Stay),
@@ -92,16 +92,16 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
 pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal: &mut u32) -> Decision {
     let commit = commit(flash, target);
     let trial = trial(flash, target, start);
-    let is_on_trial = matches!(trial, Trial::Open | Trial::Lost(_));
+    let is_on_trial = trial.is_undecided();
     let crashes = start.crashes.count();
     if !is_on_trial {
         note_proven(flash, target, start.proof);
     }
-    if commit == Commit::Pending {
-        return Decision::Copy;
-    }
     if let Trial::Lost(_) = trial {
         return Decision::Revert;
+    }
+    if commit == Commit::Pending && !trial.has_failed() {
+        return Decision::Copy;
     }
     if start.stay {
         return Decision::Stay(Stay::Asked);
@@ -116,6 +116,8 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
             }
             Decision::Start(header)
         }
+        // A cut at the end of the return may have repeated it.
+        Err(_) if trial.has_failed() => Decision::Revert,
         // A cut while the copy was marked as done may have left a mark that read as not programmed, so the copy began
         // again. Now the mark reads as programmed, but its image is still in staging.
         Err(_) if commit == Commit::Done => Decision::Copy,
@@ -154,10 +156,10 @@ fn note_proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) {
     }
 }
 
-/// Records that nothing older than this application may run from now on.
+/// Records that nothing older than this application, which is confirmed, may run from now on.
 fn note<F: Flash>(flash: &mut F, target: &Target, header: &Header) {
     // If this fails, the next start tries again.
-    let _ = target.security().note(flash, header);
+    let _ = trial::close(flash, &target.layout).and_then(|()| target.security().note(flash, header));
 }
 
 /// The header of the application, if the application is complete, is for this node, and its signature is or was
@@ -173,14 +175,11 @@ fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32
     let area = target.layout.application();
     let header = image::admitted(flash, target, area)?;
     let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
-    let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
-    loop {
-        if let Some(header) = check.step(flash, target)? {
-            *seal = if let Proof::Of(word) = proof { word } else { 0 };
-            if !is_proven {
-                *seal = check.seal(target);
-            }
-            return Ok(header);
-        }
+    let mut check = FullCheck::of(&header, area, !is_proven);
+    while !check.step(flash, target)? {}
+    *seal = if let Proof::Of(word) = proof { word } else { 0 };
+    if !is_proven {
+        *seal = check.seal(target);
     }
+    Ok(*check.header())
 }

@@ -3,15 +3,15 @@
 use core::ops::Range;
 
 use crate::area::Area;
-use crate::flash::{Flash, all_are, read_step};
+use crate::flash::{CHUNK, Flash, PIECES, all_are, read_piece};
 use crate::refusal::Refusal;
 
 /// An erase in progress.
 #[derive(Clone, Debug)]
 pub(crate) struct Erase {
-    area: Area,
-    /// Number of sectors whose erase was begun.
-    begun: usize,
+    /// Sizes of the sectors whose erase was not begun, and the start of the first one.
+    sectors: &'static [u32],
+    next: u32,
     at_work: bool,
     /// Range that has not been checked yet.
     rest: Range<u32>,
@@ -19,7 +19,8 @@ pub(crate) struct Erase {
 
 impl Erase {
     pub(crate) fn new(area: Area) -> Erase {
-        Erase { area, begun: 0, at_work: false, rest: area.start()..area.end() }
+        let (next, sectors) = (area.start(), area.sizes());
+        Erase { sectors, next, at_work: false, rest: next..area.end() }
     }
 
     /// Whether the flash was erasing at the last step.
@@ -34,23 +35,18 @@ impl Erase {
         if self.at_work {
             return Ok(false);
         }
-        match self.area.sectors().nth(self.begun) {
-            Some(sector) => self.begin(flash, sector.start),
-            None => self.prove(flash),
-        }
-    }
-
-    fn begin<F: Flash>(&mut self, flash: &mut F, sector: u32) -> Result<bool, Refusal> {
-        flash.start_erase(sector).map_err(|_| Refusal::NotCleared)?;
-        (self.begun, self.at_work) = (self.begun.saturating_add(1), true);
+        let Some((size, others)) = self.sectors.split_first() else { return self.prove(flash) };
+        flash.start_erase(self.next).map_err(|_| Refusal::NotCleared)?;
+        (self.sectors, self.next, self.at_work) = (others, self.next.saturating_add(*size), true);
         Ok(false)
     }
 
     fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
-        let mut erased = true;
-        self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
-            erased &= all_are(bytes, 0xFF);
-        })?;
-        if erased { Ok(self.rest.is_empty()) } else { Err(Refusal::NotCleared) }
+        for _ in 0..PIECES {
+            if !all_are(read_piece(flash, &mut self.rest, &mut [0; CHUNK])?, 0xFF) {
+                return Err(Refusal::NotCleared);
+            }
+        }
+        Ok(self.rest.is_empty())
     }
 }

@@ -58,26 +58,21 @@ impl<F: Flash> Flash for &mut F {
 pub(crate) const CHUNK: usize = CHUNK_LEN as usize;
 /// The same number, as a distance in flash.
 pub(crate) const CHUNK_LEN: u32 = 256;
-/// Bytes read and checked in one step.
-pub(crate) const STEP: u32 = 4 * CHUNK_LEN;
+/// Number of pieces read and checked in one step: 1 KiB.
+pub(crate) const PIECES: u32 = 4;
 
-/// Gives `range` to `take` in pieces of at most [`CHUNK`] bytes, as far as one step goes. Returns the place to continue
-/// at.
-pub(crate) fn read_step<F: Flash>(
+/// Reads the next bytes of `rest` into the buffer, as many as fit, and removes them from `rest`. No bytes are left at
+/// the end.
+#[inline(never)] // Many callers, and little room in flash.
+pub(crate) fn read_piece<'a, F: Flash>(
     flash: &mut F,
-    range: core::ops::Range<u32>,
-    mut take: impl FnMut(&[u8]),
-) -> Result<u32, Refusal> {
-    let end = range.end.min(range.start.saturating_add(STEP));
-    let mut at = range.start;
-    while at < end {
-        let mut buffer = [0; CHUNK];
-        let piece = first(&mut buffer, end.saturating_sub(at));
-        flash.read(at, piece).map_err(|_| Refusal::Unspecified)?;
-        take(piece);
-        at = at.saturating_add(CHUNK_LEN);
-    }
-    Ok(end)
+    rest: &mut core::ops::Range<u32>,
+    buffer: &'a mut [u8; CHUNK],
+) -> Result<&'a [u8], Refusal> {
+    let piece = first(buffer, rest.end.saturating_sub(rest.start));
+    flash.read(rest.start, piece).map_err(|_| Refusal::Unspecified)?;
+    rest.start = rest.end.min(rest.start.saturating_add(CHUNK_LEN));
+    Ok(piece)
 }
 
 /// Whether all bytes have this value.

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::flash::all_are;
 use crate::refusal::Refusal;
 
 /// Bytes of the header (region `IMAGE_HEADER` of memory.x).
@@ -13,6 +14,8 @@ pub const SIGNATURE_LEN: usize = 64;
 /// Number of signed bytes of the header: all bytes before the signature.
 pub const SIGNED_LEN: usize = HEADER_LEN - SIGNATURE_LEN - CRC_LEN;
 const CRC_LEN: usize = 4;
+/// Bytes of the fields at the begin of the header. The bytes between them and the signature are reserved.
+const FIELDS_LEN: usize = 36;
 
 /// First word of every image, whatever its format.
 const MAGIC: u32 = u32::from_le_bytes(*b"CNFW");
@@ -41,8 +44,8 @@ impl fmt::Display for Version {
 /// Properties of an image, set by its maker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Description {
-    /// The product, as in 1018h:2.
-    pub product: u32,
+    /// The board, as in 2004h:1.
+    pub board: u32,
     /// The hardware revisions on which the image runs: bit n for revision n.
     pub hardware: u32,
     /// The version, for information only.
@@ -64,6 +67,8 @@ pub struct Header {
     length: u32,
     code_crc: u32,
     signature: [u8; SIGNATURE_LEN],
+    /// Over all other bytes of the header.
+    crc: u32,
 }
 
 impl Header {
@@ -73,14 +78,17 @@ impl Header {
     pub fn describe(description: Description, code: &[u8]) -> Option<Header> {
         let length = u32::try_from(code.len()).ok()?;
         let code_crc = checksum::of(code);
-        let header = Header { description, length, code_crc, signature: [0; SIGNATURE_LEN] };
-        header.is_sensible().then_some(header)
+        let header = Header { description, length, code_crc, signature: [0; SIGNATURE_LEN], crc: 0 };
+        header.is_sensible().then_some(header.with_signature([0; SIGNATURE_LEN]))
     }
 
     /// The same header with this signature, made over [`Header::signed_part`] and the code.
     #[must_use]
     pub fn with_signature(self, signature: [u8; SIGNATURE_LEN]) -> Header {
-        Header { signature, ..self }
+        let mut digest = checksum::begin();
+        digest.update(&self.signed_part());
+        digest.update(&signature);
+        Header { signature, crc: digest.finalize(), ..self }
     }
 
     /// Properties of the image.
@@ -110,11 +118,11 @@ impl Header {
     /// The bytes before the signature.
     #[must_use]
     pub fn signed_part(&self) -> [u8; SIGNED_LEN] {
-        let Description { product, hardware, version, counter, key, revokes } = self.description;
+        let Description { board, hardware, version, counter, key, revokes } = self.description;
         let Version { major, minor, patch } = version;
         let number = u32::from(major) | u32::from(minor) << 16;
         let keys = u32::from(patch) | u32::from(key) << 16 | u32::from(revokes) << 24;
-        let words = [MAGIC, FORMAT, product, hardware, number, keys, self.length, self.code_crc, counter];
+        let words = [MAGIC, FORMAT, board, hardware, number, keys, self.length, self.code_crc, counter];
         let mut bytes = [0; SIGNED_LEN];
         bytes.as_chunks_mut().0.iter_mut().zip(words).for_each(|(to, word)| *to = word.to_le_bytes());
         bytes
@@ -123,10 +131,7 @@ impl Header {
     /// The CRC-32 at the end of the header, over all other bytes of the header.
     #[must_use]
     pub fn crc(&self) -> u32 {
-        let mut digest = checksum::begin();
-        digest.update(&self.signed_part());
-        digest.update(&self.signature);
-        digest.finalize()
+        self.crc
     }
 
     /// The bytes of the header in flash.
@@ -137,7 +142,7 @@ impl Header {
         let content = signed.iter().chain(&self.signature);
         bytes.iter_mut().zip(content).for_each(|(to, byte)| *to = *byte);
         if let Some(end) = bytes.last_chunk_mut() {
-            *end = self.crc().to_le_bytes();
+            *end = self.crc.to_le_bytes();
         }
         bytes
     }
@@ -153,23 +158,15 @@ impl Header {
         if (next(), next()) != (MAGIC, FORMAT) {
             return Err(Refusal::UnknownFormat);
         }
-        let (product, hardware, number, keys) = (next(), next(), next(), next());
+        let (board, hardware, number, keys) = (next(), next(), next(), next());
         let (length, code_crc, counter) = (next(), next(), next());
         let version = Version { major: low(number), minor: low(number >> 16), patch: low(keys) };
         let [_, _, key, revokes] = keys.to_le_bytes();
-        let description = Description { product, hardware, version, counter, key, revokes };
-        let header = Header { description, length, code_crc, signature: signature_in(bytes) };
-        header.agrees_with(bytes)
-    }
-
-    fn agrees_with(self, bytes: &[u8; HEADER_LEN]) -> Result<Header, Refusal> {
-        if !has_good_crc(bytes) {
-            Err(Refusal::HeaderCrc)
-        } else if self.encode() != *bytes || !self.is_sensible() {
-            Err(Refusal::HeaderContent)
-        } else {
-            Ok(self)
-        }
+        let description = Description { board, hardware, version, counter, key, revokes };
+        let crc = crc_of(bytes).ok_or(Refusal::HeaderCrc)?;
+        let header = Header { description, length, code_crc, signature: signature_in(bytes), crc };
+        let reserved = bytes.get(FIELDS_LEN..SIGNED_LEN).unwrap_or_default();
+        if all_are(reserved, 0) && header.is_sensible() { Ok(header) } else { Err(Refusal::HeaderContent) }
     }
 
     /// Whether the code is a whole number of words and not empty, the key number is possible, and the image does not
@@ -191,6 +188,9 @@ fn signature_in(bytes: &[u8; HEADER_LEN]) -> [u8; SIGNATURE_LEN] {
     signature
 }
 
-fn has_good_crc(bytes: &[u8; HEADER_LEN]) -> bool {
-    bytes.split_last_chunk().is_some_and(|(content, crc)| checksum::of(content).to_le_bytes() == *crc)
+/// The CRC at the end of the header, if it is right.
+fn crc_of(bytes: &[u8; HEADER_LEN]) -> Option<u32> {
+    let (content, crc) = bytes.split_last_chunk()?;
+    let crc = u32::from_le_bytes(*crc);
+    (checksum::of(content) == crc).then_some(crc)
 }

@@ -5,7 +5,7 @@ use core::ops::Range;
 use checksum::Digest;
 
 use crate::area::Area;
-use crate::flash::{Flash, read_step};
+use crate::flash::{CHUNK, Flash, PIECES, read_piece};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::refusal::Refusal;
 use crate::seal::seal;
@@ -52,16 +52,21 @@ impl CrcCheck {
         CrcCheck { expected: header.code_crc(), rest: code(header, area), digest: checksum::begin() }
     }
 
-    /// Does one step; returns whether the check is complete. The CRC is judged only at the end.
+    /// Does one step; returns whether the check is complete. The CRC is judged only at the end. The bytes are also added
+    /// to the message.
     pub(crate) fn step<F: Flash>(
         &mut self,
         flash: &mut F,
-        mut also: impl FnMut(&[u8]),
+        message: &mut Option<Message>,
     ) -> Result<bool, Refusal> {
-        self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
+        for _ in 0..PIECES {
+            let mut buffer = [0; CHUNK];
+            let bytes = read_piece(flash, &mut self.rest, &mut buffer)?;
             self.digest.update(bytes);
-            also(bytes);
-        })?;
+            if let Some(message) = message {
+                message.add(bytes);
+            }
+        }
         if !self.rest.is_empty() {
             return Ok(false);
         }
@@ -86,32 +91,28 @@ pub(crate) struct FullCheck {
 impl FullCheck {
     /// A check of the staged image.
     pub(crate) fn new<F: Flash>(flash: &mut F, target: &Target) -> Result<FullCheck, Refusal> {
-        Ok(FullCheck::of(candidate(flash, target)?, target.layout.staging()))
+        Ok(FullCheck::of(&candidate(flash, target)?, target.layout.staging(), true))
     }
 
-    /// A check of the image with this header in an area.
-    pub(crate) fn of(header: Header, area: Area) -> FullCheck {
-        let crc = CrcCheck::new(&header, area);
-        let message = Some(Message::of(&header));
-        FullCheck { header, crc, message, hash: [0; HASH_LEN], signature: None, first: None }
+    /// A check of the image with this header in an area, with or without its signature.
+    pub(crate) fn of(header: &Header, area: Area, is_signed: bool) -> FullCheck {
+        let crc = CrcCheck::new(header, area);
+        let message = is_signed.then(|| Message::of(header));
+        FullCheck { header: *header, crc, message, hash: [0; HASH_LEN], signature: None, first: None }
     }
 
-    /// The same check without the signature.
-    pub(crate) fn of_sum(header: Header, area: Area) -> FullCheck {
-        FullCheck { message: None, ..FullCheck::of(header, area) }
+    /// The header of the image.
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
     }
 
-    /// Does one step; returns the header once the whole check has passed.
-    pub(crate) fn step<F: Flash>(
-        &mut self,
-        flash: &mut F,
-        target: &Target,
-    ) -> Result<Option<Header>, Refusal> {
+    /// Does one step; returns whether the whole check has passed.
+    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<bool, Refusal> {
         let Some(signature) = &mut self.signature else { return self.read(flash, target) };
         match (signature.step(), self.first) {
-            (None, _) => Ok(None),
+            (None, _) => Ok(false),
             (Some(false), _) => Err(Refusal::Signature),
-            (Some(true), Some(_)) => Ok(Some(self.header)),
+            (Some(true), Some(_)) => Ok(true),
             (Some(true), None) => {
                 self.first = Some(signature.seal(self.header.crc()));
                 self.verify(target)
@@ -128,20 +129,19 @@ impl FullCheck {
         seal(signature.seal(first), signature.key(), key)
     }
 
-    fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
-        let message = &mut self.message;
-        if !self.crc.step(flash, |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
-            return Ok(None);
+    fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<bool, Refusal> {
+        if !self.crc.step(flash, &mut self.message)? {
+            return Ok(false);
         }
-        let Some(message) = message else { return Ok(Some(self.header)) };
+        let Some(message) = &mut self.message else { return Ok(true) };
         self.hash = message.end();
         self.verify(target)
     }
 
     /// Starts a verification of the signature.
-    fn verify(&mut self, target: &Target) -> Result<Option<Header>, Refusal> {
+    fn verify(&mut self, target: &Target) -> Result<bool, Refusal> {
         let (signature, key) = (self.header.signature(), target.key_of(&self.header));
         self.signature = key.and_then(|key| Verification::new(&self.hash, CONTEXT, signature, key));
-        if self.signature.is_some() { Ok(None) } else { Err(Refusal::Signature) }
+        if self.signature.is_some() { Ok(false) } else { Err(Refusal::Signature) }
     }
 }

@@ -31,9 +31,47 @@ const SECOND: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY_2") {
     None => FIRST,
 };
 
-/// Whether one of these keys is the development key.
-pub const HAS_DEVELOPMENT_KEY: bool = is_same(&FIRST, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY)
-    || is_same(&SECOND, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
+/// Public keys whose secret half is published: in this repository (the development key, and the keys of the tests) or in
+/// RFC 8032, 7.1 and 7.3; and two points of small order, for which anybody can make signatures.
+const PUBLISHED: [[u8; KEY_LEN]; 10] = [
+    DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
+    key(b"2152f8d19b791d24453242e15f2eab6cb7cffa7b6a5ed30097960e069881db12"),
+    key(b"22fc297792f0b6ffc0bfcfdb7edb0c0aa14e025a365ec0e342e86e3829cb74b6"),
+    key(b"d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a"),
+    key(b"3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c"),
+    key(b"fc51cd8e6218a1a38da47ed00230f0580816ed13ba3303ac5deb911548908025"),
+    key(b"278117fc144c72340f67d0f2316e8386ceffbf2b2428c9c51fef7c597f1d426e"),
+    key(b"ec172b93ad5e563bf4932c70e1245034c35467ef2efd4d64ebf819683467e2bf"),
+    [0; KEY_LEN],
+    key(b"0100000000000000000000000000000000000000000000000000000000000000"),
+];
+
+/// Authorisation keys ([`crate::AUTHORISATION_KEY`]) that are published: the one of the tests, and zeros.
+const PUBLISHED_SECRETS: [[u8; KEY_LEN]; 2] = [[0xC7; KEY_LEN], [0; KEY_LEN]];
+
+/// Whether the secret half of this public key is published. Such a key protects nothing.
+#[must_use]
+pub const fn is_published(key: &[u8; KEY_LEN]) -> bool {
+    is_among(key, &PUBLISHED)
+}
+
+/// Whether a key of this build is published: one of [`PUBLIC_KEYS`], or the authorisation key.
+pub const HAS_PUBLISHED_KEY: bool = is_published(&FIRST)
+    || is_published(&SECOND)
+    || match &crate::AUTHORISATION_KEY {
+        Some(secret) => is_among(secret, &PUBLISHED_SECRETS),
+        None => false,
+    };
+
+const fn is_among(key: &[u8; KEY_LEN], mut list: &[[u8; KEY_LEN]]) -> bool {
+    while let [first, rest @ ..] = list {
+        if is_same(first, key) {
+            return true;
+        }
+        list = rest;
+    }
+    false
+}
 
 /// The key with these digits, evaluated at compile time: anything but 64 hexadecimal digits stops the build.
 #[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
@@ -77,6 +115,18 @@ mod tests {
         const DIGITS: &[u8; 64] = b"FB874bc8d19eeb05b1016f27c27ccd9e985325ca80d8068bda9b5f44a39fe466";
         const KEY: [u8; KEY_LEN] = key(DIGITS);
         assert_eq!(KEY, DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
+    }
+
+    #[test]
+    fn a_published_key_is_known_whatever_its_place_in_the_list() {
+        for key in PUBLISHED {
+            assert!(is_published(&key));
+            let mut other = key;
+            other[31] ^= 0x40;
+            assert!(!is_published(&other));
+        }
+        assert!(PUBLISHED_SECRETS.iter().all(|secret| is_among(secret, &PUBLISHED_SECRETS)));
+        const { assert!(HAS_PUBLISHED_KEY, "a build without keys has the development key") };
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Field update of the application over CAN (CiA 302-3), safe against a power cut at any moment, and against images
-//! that are damaged, for another device, too old, or not signed. docs/update.md describes the format of an image, the
+//! that are damaged, for another board, too old, or not signed. docs/update.md describes the format of an image, the
 //! states, and the effect of a cut at each point.
 //!
 //! The bootloader calls [`boot`] at every start, and gives an [`Updater`] the commands of the master and a [`Flash`]:

@@ -24,9 +24,9 @@ pub enum Refusal {
     TooLong,
     /// A command that the state does not allow, or a flash that cannot be read.
     Unspecified,
-    /// The image is for another product.
-    Product {
-        /// The product of this node.
+    /// The image is for another board.
+    Board {
+        /// The board of this node.
         expected: u32,
     },
     /// The image does not run on this hardware.
@@ -61,6 +61,8 @@ pub enum Refusal {
         /// Cause of the failure.
         reason: Reason,
     },
+    /// The application is on trial: it must be confirmed or taken back before the next update.
+    OnTrial,
 }
 
 impl Refusal {
@@ -75,7 +77,7 @@ impl Refusal {
             Refusal::Write => 5,
             Refusal::TooLong => 6,
             Refusal::Unspecified => 63,
-            Refusal::Product { .. } => 64,
+            Refusal::Board { .. } => 64,
             Refusal::Hardware { .. } => 65,
             Refusal::Counter { .. } => 66,
             Refusal::Signature => 67,
@@ -84,6 +86,7 @@ impl Refusal {
             Refusal::Crashes { .. } => 70,
             Refusal::Revoked { .. } => 71,
             Refusal::TakenBack { .. } => 72,
+            Refusal::OnTrial => 73,
         }
     }
 
@@ -91,7 +94,7 @@ impl Refusal {
     #[must_use]
     pub fn detail(self) -> u16 {
         match self {
-            Refusal::Product { expected } => (expected & 0xFFFF) as u16,
+            Refusal::Board { expected } => (expected & 0xFFFF) as u16,
             Refusal::Hardware { revision } => revision.into(),
             Refusal::Counter { least } => u16::try_from(least).unwrap_or(u16::MAX),
             Refusal::Crashes { count } => count.into(),

@@ -103,8 +103,7 @@ mod tests {
     const AREA: Security = Security(Area::new(0, &[512]));
 
     fn header(counter: u32, key: u8, revokes: u8) -> Header {
-        let about =
-            Description { product: 1, hardware: 1, version: Version::default(), counter, key, revokes };
+        let about = Description { board: 1, hardware: 1, version: Version::default(), counter, key, revokes };
         Header::describe(about, &[0; 4]).unwrap()
     }
 

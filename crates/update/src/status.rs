@@ -57,7 +57,10 @@ impl fmt::Display for Status {
             6 => f.write_str("address error: the image is longer than the memory for it"),
             7 => f.write_str("the flash is secured"),
             63 => f.write_str("unspecified error"),
-            64 => write!(f, "the image is for another product (the node is one of {detail:04X}h in 1018h:2)"),
+            64 => write!(
+                f,
+                "the image is for another board (the code of the node, 2004h:1, ends with {detail:04X}h)"
+            ),
             65 => write!(f, "the image does not run on hardware revision {detail}"),
             66 => write!(f, "the security counter is too low (the node asks for {detail} or more)"),
             67 => f.write_str("the signature is not good"),
@@ -70,6 +73,7 @@ impl fmt::Display for Status {
             72 => f.write_str(
                 "the new program was not confirmed in time, or was taken back; the one before is back",
             ),
+            73 => f.write_str("the program is on trial: confirm it or take it back before the next update"),
             71 => write!(f, "the key number {detail}, with which the image is signed, is revoked"),
             code => write!(f, "error {code} of the manufacturer, detail {detail}"),
         }
@@ -84,7 +88,7 @@ mod tests {
     use super::*;
     use crate::trial::Reason;
 
-    const ALL: [Refusal; 18] = [
+    const ALL: [Refusal; 19] = [
         Refusal::NoProgram,
         Refusal::UnknownFormat,
         Refusal::HeaderCrc,
@@ -94,7 +98,7 @@ mod tests {
         Refusal::Write,
         Refusal::TooLong,
         Refusal::Unspecified,
-        Refusal::Product { expected: 0x1234_5678 },
+        Refusal::Board { expected: 0x1234_5678 },
         Refusal::Hardware { revision: 3 },
         Refusal::Counter { least: 70_000 },
         Refusal::Signature,
@@ -103,6 +107,7 @@ mod tests {
         Refusal::Crashes { count: 3 },
         Refusal::Revoked { key: 1 },
         Refusal::TakenBack { reason: Reason::Starts },
+        Refusal::OnTrial,
     ];
 
     #[test]
@@ -113,13 +118,13 @@ mod tests {
         assert_eq!(Status::GOOD.word(), 0);
         assert_eq!(Status::BUSY.word(), 1);
         assert_eq!(Status::refused(Refusal::CodeCrc).word(), 6);
-        assert_eq!(Status::refused(Refusal::Product { expected: 0x1234_5678 }).word(), 0x5678_0080);
+        assert_eq!(Status::refused(Refusal::Board { expected: 0x1234_5678 }).word(), 0x5678_0080);
     }
 
     #[test]
     fn the_detail_is_what_the_node_expects_or_a_count() {
         for (refusal, detail) in [
-            (Refusal::Product { expected: 0x1234_5678 }, 0x5678),
+            (Refusal::Board { expected: 0x1234_5678 }, 0x5678),
             (Refusal::Hardware { revision: 3 }, 3),
             (Refusal::Counter { least: 9 }, 9),
             (Refusal::Counter { least: 70_000 }, u16::MAX),

@@ -12,8 +12,8 @@ use crate::security::Security;
 pub struct Target {
     /// The areas in flash.
     pub layout: Layout,
-    /// The product (1018h:2).
-    pub product: u32,
+    /// The board (2004h:1).
+    pub board: u32,
     /// The hardware revision, 0 to 31.
     pub hardware: u8,
     /// The public keys of images, by their number; [`crate::key::PUBLIC_KEYS`] in the product.
@@ -37,11 +37,11 @@ impl Target {
         self.security().admit(flash, header.description())
     }
 
-    /// Whether the image is for this product and hardware, not too long, and has a counter that can be recorded.
+    /// Whether the image is for this board and hardware, not too long, and has a counter that can be recorded.
     fn fits(&self, header: &Header) -> Result<(), Refusal> {
         let about = header.description();
-        if about.product != self.product {
-            Err(Refusal::Product { expected: self.product })
+        if about.board != self.board {
+            Err(Refusal::Board { expected: self.board })
         } else if about.hardware.checked_shr(self.hardware.into()).unwrap_or(0) & 1 == 0 {
             Err(Refusal::Hardware { revision: self.hardware })
         } else if image_len(header) > self.layout.longest_image() {

@@ -1,20 +1,22 @@
 //! The trial of a new image: the previous image is kept until the new one is confirmed, and is restored if the new one
 //! fails.
 //!
-//! The trial is open from the end of the copy (the commit record of staging is *done*) for as long as the record of the
-//! kept image is *pending*; confirming means to program *done* there. The marks of the trial are in front of the commit
-//! record of staging, and an update erases them together with staging:
+//! The record of the kept image decides. While it is *pending*, the confirmed program is the kept one, and the program in
+//! the application area is on trial. Only two things end that: a confirmation, which programs *done* there, and the
+//! return, which does so after the copy of the kept image. The next update begins afterwards: until then staging holds
+//! the image on trial and, in front of the commit record, the marks of the trial:
 //!
 //! | mark | set |
 //! |---|---|
 //! | 0 to 2 | at each unrequested start: after a crash, the watchdog, or power-on |
 //! | 3 | when the trial is withdrawn: no confirmation in time, or the command of a master |
 //!
-//! Mark 3 is also set before the previous image is restored, so that marks which a cut left half programmed no longer
-//! matter.
+//! The trial is lost with mark 3, or with all of the marks 0 to 2. From then on the staged image is never copied again,
+//! and an application that is not whole is restored from the kept image, whatever the records read after a cut. Mark 3
+//! is also set before the previous image is restored, so that marks which a cut left half programmed no longer matter.
 //!
-//! The trial is lost with mark 3, or with all of the marks 0 to 2. A mark is a word of zeros, like those of the record.
-//! The trial concerns one image only: an application that a debugger has written since is not on trial.
+//! A mark is a word of zeros, like those of the record. The trial concerns one image only: an application that a debugger
+//! has written since is not on trial, and its first start closes the record of the kept image.
 
 use core::ops::Range;
 
@@ -22,6 +24,7 @@ use crate::area::{Area, Layout};
 use crate::crashes::Crashes;
 use crate::flash::Flash;
 use crate::header::HEADER;
+use crate::image;
 use crate::record::{Commit, RECORD_ROOM, Record, is_zero, mark};
 use crate::refusal::Refusal;
 
@@ -38,6 +41,8 @@ pub enum Trial {
     /// No trial: the application was confirmed, or there is no image to restore.
     #[default]
     None,
+    /// The new image is being copied, and the previous one is kept.
+    Begun,
     /// The application has to be confirmed.
     Open,
     /// The previous image has to be restored.
@@ -59,13 +64,16 @@ impl Trial {
     /// Reads the state of the trial.
     pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Trial {
         let (staged, kept) = (staged(layout).read(flash), kept(layout).read(flash));
-        let image = if staged == Commit::None { layout.kept() } else { layout.staging() };
-        let is_in_place = crc(flash, layout.application()) == crc(flash, image);
         match (staged, kept, reason(flash, layout)) {
             // In this state the application may be half copied.
-            (Commit::Done, Commit::Pending, Some(reason)) => Trial::Lost(reason),
-            (Commit::Done, Commit::Pending, None) if is_in_place => Trial::Open,
-            (Commit::None, _, Some(reason)) if is_in_place => Trial::Over(reason),
+            (_, Commit::Pending, Some(reason)) => Trial::Lost(reason),
+            (_, Commit::Done, Some(reason)) if !is_another(flash, layout, layout.kept()) => {
+                Trial::Over(reason)
+            }
+            (Commit::Pending, Commit::Pending, None) => Trial::Begun,
+            (Commit::Done, Commit::Pending, None) if !is_another(flash, layout, layout.staging()) => {
+                Trial::Open
+            }
             _ => Trial::None,
         }
     }
@@ -79,17 +87,34 @@ impl Trial {
     /// Confirms the application. Repeated calls do no harm.
     ///
     /// # Errors
-    /// [`Refusal::Write`], [`Refusal::Unspecified`].
+    /// [`Refusal::Write`]; [`Refusal::Unspecified`] if the trial is lost.
     pub fn confirm<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+        if reason(flash, layout).is_some() {
+            return Err(Refusal::Unspecified);
+        }
+        // A cut may have left a mark that reads as set now and not later: the image would be copied once more.
+        if staged(layout).read(flash) == Commit::Done {
+            staged(layout).done(flash)?;
+        }
         kept(layout).done(flash)
     }
 
-    /// Withdraws the trial: the previous image is restored at the next start.
+    /// Withdraws the trial: the previous image is restored at the next start. Does nothing to a confirmed application.
     ///
     /// # Errors
     /// [`Refusal::Write`], [`Refusal::Unspecified`].
     pub fn withdraw<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
-        mark(flash, place(layout, WITHDRAWN))
+        if kept(layout).read(flash) == Commit::Pending { fail(flash, layout) } else { Ok(()) }
+    }
+
+    /// Whether the trial was lost: the staged image is not copied again, and the kept one is the right program.
+    pub(crate) fn has_failed(self) -> bool {
+        matches!(self, Trial::Lost(_) | Trial::Over(_))
+    }
+
+    /// Whether the application is or may be on trial: neither it nor the kept image is confirmed for good.
+    pub(crate) fn is_undecided(self) -> bool {
+        matches!(self, Trial::Begun | Trial::Open | Trial::Lost(_))
     }
 }
 
@@ -103,11 +128,24 @@ pub(crate) fn kept(layout: &Layout) -> Record {
     Record(layout.kept().end())
 }
 
-/// The CRC of the header in this area, which identifies an image. Zeros for a flash that cannot be read.
-fn crc<F: Flash>(flash: &mut F, area: Area) -> [u8; 4] {
+/// Closes the record of a kept image that is pending without a trial.
+pub(crate) fn close<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+    let record = kept(layout);
+    if record.read(flash) == Commit::Pending { record.done(flash) } else { Ok(()) }
+}
+
+/// Loses the trial for good, before the application is touched.
+pub(crate) fn fail<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+    mark(flash, place(layout, WITHDRAWN))
+}
+
+/// Whether the application has a header, but not that of the image in `area`. Without a header it is damaged, or half
+/// copied.
+fn is_another<F: Flash>(flash: &mut F, layout: &Layout, area: Area) -> bool {
     let mut crc = [0; 4];
-    let _ = flash.read(area.start().saturating_add(HEADER - 4), &mut crc);
-    crc
+    let is_read = flash.read(area.start().saturating_add(HEADER - 4), &mut crc).is_ok();
+    let application = image::header(flash, layout.application());
+    is_read && application.is_ok_and(|header| header.crc().to_le_bytes() != crc)
 }
 
 /// Counts an unrequested start.

@@ -61,8 +61,6 @@ enum State {
     Receiving(Download),
     Checking(FullCheck, Plan),
     Committed,
-    /// The destination of the image with this header is being erased.
-    Erasing(Erase, Header, Plan),
     Copying(Copy, Plan),
     Installed,
 }
@@ -112,7 +110,7 @@ impl<F: Flash> Updater<F> {
             State::Receiving(_) => Phase::Receiving,
             State::Checking(..) => Phase::Checking,
             State::Committed => Phase::Committed,
-            State::Erasing(..) | State::Copying(..) => Phase::Copying,
+            State::Copying(..) => Phase::Copying,
             State::Installed => Phase::Installed,
         }
     }
@@ -125,7 +123,8 @@ impl<F: Flash> Updater<F> {
     /// Kind of the next poll.
     pub fn next(&self) -> Next {
         match &self.state {
-            State::Clearing(erase) | State::Erasing(erase, ..) if erase.is_at_work() => Next::Erasing,
+            State::Clearing(erase) if erase.is_at_work() => Next::Erasing,
+            State::Copying(copy, _) if copy.is_erasing() => Next::Erasing,
             _ if self.is_busy() => Next::Step,
             _ => Next::Nothing,
         }
@@ -135,10 +134,16 @@ impl<F: Flash> Updater<F> {
     /// yet, is lost; the application is unchanged.
     ///
     /// # Errors
+    /// [`Refusal::OnTrial`] while the application is on trial, because staging holds its marks;
     /// [`Refusal::Unspecified`] while the machine is busy; [`Refusal::Write`].
     pub fn clear(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
-        let outcome = self.staged().revoke(&mut self.flash);
+        let (flash, layout) = (&mut self.flash, &self.target.layout);
+        if Trial::read(flash, layout).is_undecided() {
+            return self.refuse(Refusal::OnTrial);
+        }
+        // There is no trial: a record of the kept image that a cut has left pending must not make one later.
+        let outcome = trial::kept(layout).done(flash).and_then(|()| trial::staged(layout).revoke(flash));
         self.state = State::Clearing(Erase::new(self.target.layout.staging()));
         self.settle(outcome)
     }
@@ -203,21 +208,21 @@ impl<F: Flash> Updater<F> {
     }
 
     /// Copies the kept image back to the application area, after checking it, because the application has lost its
-    /// trial ([`crate::Decision::Revert`]). If the kept image is not valid, the trial ends without it.
+    /// trial or was not restored completely ([`crate::Decision::Revert`]). If the kept image is not valid, the trial
+    /// ends without it.
     ///
     /// # Errors
     /// [`Refusal::Unspecified`] if no trial is lost, or while busy; the reason why the kept image is refused.
     pub fn revert(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
         let layout = &self.target.layout;
-        if !matches!(Trial::read(&mut self.flash, layout), Trial::Lost(_)) {
+        if !Trial::read(&mut self.flash, layout).has_failed() {
             return Err(Refusal::Unspecified);
         }
-        // The loss of the trial must be final before the application is touched.
-        Trial::withdraw(&mut self.flash, layout)?;
+        trial::fail(&mut self.flash, layout)?;
         let kept = layout.kept();
         let header = image::admitted(&mut self.flash, &self.target, kept);
-        self.check(Plan::Revert, header.map(|header| FullCheck::of(header, kept)))
+        self.check(Plan::Revert, header.map(|header| FullCheck::of(&header, kept, true)))
     }
 
     /// Starts a check.
@@ -234,16 +239,31 @@ impl<F: Flash> Updater<F> {
 
     /// Does one step of the operation in progress, if any. Returns the kind of the next poll.
     pub fn poll(&mut self) -> Next {
-        let keeps = matches!(self.state, State::Erasing(.., Plan::Keep) | State::Copying(_, Plan::Keep));
+        let plan = if let State::Copying(_, plan) = self.state { Some(plan) } else { None };
         if let Err(refusal) = self.step() {
-            if keeps {
-                // The application is still complete and stays: the next start must not try the staged image again.
-                let _ = self.staged().revoke(&mut self.flash);
+            if plan == Some(Plan::Keep) || plan == Some(Plan::Install) && self.has_kept() {
+                // The next start must not try the staged image again.
+                let _ = self.abandon();
             }
             // The caller can read the result in the status.
             let _ = self.settle(Err(refusal));
         }
         self.next()
+    }
+
+    /// Whether the previous program is the kept image, because the application area is being replaced.
+    fn has_kept(&mut self) -> bool {
+        self.kept().read(&mut self.flash) == Commit::Pending
+    }
+
+    /// Gives up the staged image for good. If the previous program is kept, it is restored at the next start.
+    fn abandon(&mut self) -> Result<(), Refusal> {
+        if self.has_kept() {
+            trial::fail(&mut self.flash, &self.target.layout)?;
+            self.staged().done(&mut self.flash)
+        } else {
+            self.staged().revoke(&mut self.flash)
+        }
     }
 
     fn staged(&self) -> Record {
@@ -291,17 +311,13 @@ impl<F: Flash> Updater<F> {
             State::Checking(check, plan) => {
                 let plan = *plan;
                 match check.step(flash, target) {
-                    Ok(None) => Ok(()),
-                    Ok(Some(header)) => self.accept(plan, header),
+                    Ok(false) => Ok(()),
+                    Ok(true) => {
+                        let header = *check.header();
+                        self.accept(plan, &header)
+                    }
                     Err(refusal) => self.give_up(plan, refusal),
                 }
-            }
-            State::Erasing(erase, header, plan) => {
-                if erase.step(flash)? {
-                    let (from, to) = plan.areas(&target.layout);
-                    self.state = State::Copying(Copy::new(*header, from, to), *plan);
-                }
-                Ok(())
             }
             State::Copying(copy, plan) => {
                 let plan = *plan;
@@ -314,7 +330,7 @@ impl<F: Flash> Updater<F> {
     }
 
     /// Continues after a successful check of the image.
-    fn accept(&mut self, plan: Plan, header: Header) -> Result<(), Refusal> {
+    fn accept(&mut self, plan: Plan, header: &Header) -> Result<(), Refusal> {
         match plan {
             Plan::Commit => {
                 self.staged().write(&mut self.flash)?;
@@ -335,22 +351,22 @@ impl<F: Flash> Updater<F> {
 
     /// Keeps the application, unless an image is kept already: the image that ran before an unconfirmed application, or
     /// this application if the copy was cut.
-    fn keep(&mut self, staged: Header) -> Result<(), Refusal> {
+    fn keep(&mut self, staged: &Header) -> Result<(), Refusal> {
         let application = self.target.layout.application();
-        if self.kept().read(&mut self.flash) == Commit::Pending {
+        if self.has_kept() {
             self.kept().close(&mut self.flash)?;
         } else if let Ok(header) = image::header(&mut self.flash, application) {
-            self.state = State::Checking(FullCheck::of_sum(header, application), Plan::Keep);
+            self.state = State::Checking(FullCheck::of(&header, application, false), Plan::Keep);
             return Ok(());
         }
         self.replace(Plan::Install, staged);
         Ok(())
     }
 
-    /// Starts to erase the destination of an image.
-    fn replace(&mut self, plan: Plan, header: Header) {
-        let (_, to) = plan.areas(&self.target.layout);
-        self.state = State::Erasing(Erase::new(to), header, plan);
+    /// Starts the copy of an image.
+    fn replace(&mut self, plan: Plan, header: &Header) {
+        let (from, to) = plan.areas(&self.target.layout);
+        self.state = State::Copying(Copy::new(header, from, to), plan);
     }
 
     /// Continues after a complete copy.
@@ -360,12 +376,7 @@ impl<F: Flash> Updater<F> {
                 self.kept().write(&mut self.flash)?;
                 return self.install_staged();
             }
-            Plan::Revert => {
-                // Without the record of staging there is no trial. A record of the kept image that stays open does no
-                // harm.
-                self.staged().revoke(&mut self.flash)?;
-                self.kept().done(&mut self.flash)?;
-            }
+            Plan::Revert => self.kept().done(&mut self.flash)?,
             Plan::Commit | Plan::Install => self.staged().done(&mut self.flash)?,
         }
         self.state = State::Installed;
@@ -375,7 +386,7 @@ impl<F: Flash> Updater<F> {
     /// Installs the staged image, which was found valid before the application was kept.
     fn install_staged(&mut self) -> Result<(), Refusal> {
         let header = image::candidate(&mut self.flash, &self.target)?;
-        self.replace(Plan::Install, header);
+        self.replace(Plan::Install, &header);
         Ok(())
     }
 
@@ -383,10 +394,11 @@ impl<F: Flash> Updater<F> {
     fn give_up(&mut self, plan: Plan, refusal: Refusal) -> Result<(), Refusal> {
         match plan {
             Plan::Commit => {}
-            Plan::Install => self.staged().revoke(&mut self.flash)?,
+            Plan::Install => self.abandon()?,
             // The application is not valid, so it cannot be kept.
             Plan::Keep => return self.install_staged(),
-            Plan::Revert => self.kept().done(&mut self.flash)?,
+            // There is no way back: the staged image is the only one.
+            Plan::Revert => self.kept().revoke(&mut self.flash)?,
         }
         Err(refusal)
     }

@@ -49,6 +49,14 @@ impl Optimisation {
 /// The other libraries that are measured: the name of the image, and of the library.
 const OTHERS: [(&str, &str); 2] = [("zencan", "zencan-node"), ("canopen-rs", "canopen-rs")];
 
+/// Our devices with fewer services: the name of the row, the image, and CANopenNode's flash.
+const DEVICES: [(&str, &str, Option<u64>); 4] = [
+    ("flash, minimal device", "minimal", None),
+    ("flash, CANopenNode's set", "set", Some(PUBLISHED_FLASH)),
+    ("flash, all services", "ours", None),
+    ("flash, services only", "services", None),
+];
+
 /// A line of a table: our figure, those of [`OTHERS`], and CANopenNode's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Row {
@@ -120,12 +128,17 @@ fn sizes(images: &Path, optimisation: Optimisation) -> Result<Vec<Row>> {
         let [ours, zencan, canopen_rs] = nodes.map(|node| Some(size(node)));
         Row { name, cells: [ours, zencan, canopen_rs, published] }
     };
-    Ok(vec![
+    let mut rows = vec![
         row("instructions", |sizes| sizes.code, None),
         row("constants, the dictionary among them", |sizes| sizes.constants, None),
         row("flash in all", Sizes::flash, Some(PUBLISHED_FLASH)),
         row("RAM without the stack", Sizes::ram, Some(PUBLISHED_RAM)),
-    ])
+    ];
+    for (name, image, published) in DEVICES {
+        let published = published.and_then(|bytes| optimisation.published_size(bytes));
+        rows.push(Row { name, cells: [Some(size_of(image)?.flash()), None, None, published] });
+    }
+    Ok(rows)
 }
 
 impl fmt::Display for Report {

@@ -93,6 +93,7 @@ impl Stm32f4 {
             // CAN_MCR: INRQ and SLEEP are cleared.
             Unit::Can(0) if offset == 0 && value & 0b11 == 0 => self.check_can(),
             Unit::Rcc | Unit::Pwr | Unit::Flash => {
+                self.check_dividers();
                 self.rules.conversions_checked = false;
                 self.check_clocks();
             }

@@ -25,6 +25,8 @@ impl Stm32f4 {
         if power && !self.backup_is_kept(now) {
             self.backup_ram = BackupRam::default();
             self.pwr.keep_backup(false);
+        } else if power && self.plant.has_weak_battery(now) {
+            self.backup_ram.decay();
         }
         let cause = self.asked.take().unwrap_or(Cause::Software);
         self.rcc.reset((!power).then_some(cause));

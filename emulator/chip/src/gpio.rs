@@ -116,6 +116,11 @@ impl Gpio {
         self.mode(pin) == Mode::Analog
     }
 
+    /// Whether a pin has the lowest output speed.
+    pub(crate) fn is_slowest(&self, pin: u32) -> bool {
+        field(self.plain.get(OSPEEDR), pin * 2, 2) == 0
+    }
+
     /// The level at the input stage.
     pub(crate) fn level(&self, pin: u32, outside: Outside) -> bool {
         if self.mode(pin) == Mode::Analog {

@@ -22,6 +22,9 @@ pub enum Loss {
     /// An abort by CAN1 comes too late: the transmission of the frame begins just before the abort request, so the
     /// request is over only at the end of the transmission.
     Abort,
+    /// The end of the frame on the bus of CAN1, for a controller that is to leave the bus: it stays on the bus until a
+    /// reset, as with RX held dominant.
+    LeaveBus,
     /// A store into the backup SRAM.
     BackupStore,
 }

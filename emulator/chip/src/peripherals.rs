@@ -111,6 +111,9 @@ pub trait Peripherals {
     /// The current levels of the interrupt lines.
     fn lines(&self) -> IrqLines;
 
+    /// The core sleeps by a WFI at this address.
+    fn slept(&mut self, _address: u32) {}
+
     /// Whether the deadline, a line, a broken rule or an effect may have changed since the last call. Changes that the
     /// bus makes in the CAN controllers do not count.
     fn take_change(&mut self) -> bool {

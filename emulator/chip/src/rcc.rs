@@ -116,6 +116,8 @@ const PINRSTF: u32 = 1 << 26;
 const CSSON: u32 = 19;
 const CSSF: u32 = 7;
 const CSSC: u32 = 23;
+/// CFGR: HPRE, PPRE1 and PPRE2.
+const DIVIDERS: u32 = 0xFCF0;
 const HSI_HERTZ: u64 = 16_000_000;
 
 /// The reset and clock controller.
@@ -135,6 +137,10 @@ pub(crate) struct Rcc {
     reset_flags: u32,
     /// The clock source in use, coded as SW.
     in_use: u32,
+    /// The last change of a divider of the buses.
+    divided: Option<Time>,
+    /// HCLK cycles from the last change of a divider to a switch of the system clock.
+    switched: Option<u64>,
 }
 
 impl Rcc {
@@ -155,6 +161,8 @@ impl Rcc {
             lsi_ready: Time::NEVER,
             reset_flags: POWER_ON_FLAGS,
             in_use: 0,
+            divided: None,
+            switched: None,
         };
         rcc.sources[HSI].switch(true, Time::ZERO);
         rcc
@@ -249,7 +257,7 @@ impl Rcc {
                 self.write_control(value, now);
                 Some(())
             }
-            CFGR => self.plain.write(CFGR, value),
+            CFGR => self.write_configuration(value, now),
             // Ready interrupts are not modelled; clearing their flags has no effect.
             CIR => {
                 self.has_failed &= !bit(value, CSSC);
@@ -264,6 +272,24 @@ impl Rcc {
             DCKCFGR.. if self.variant != Variant::F446 => None,
             _ => self.plain.write(offset, value),
         }
+    }
+
+    /// A divider and the system clock that change together have no time between them.
+    fn write_configuration(&mut self, value: u32, now: Time) -> Option<()> {
+        let changed = self.plain.get(CFGR) ^ value;
+        if changed & DIVIDERS != 0 {
+            self.divided = Some(now);
+        }
+        if changed & 0b11 != 0 {
+            let cycle = self.clocks().hclk_cycle().0.max(1);
+            self.switched = self.divided.map(|divided| now.since(divided).0 / cycle);
+        }
+        self.plain.write(CFGR, value)
+    }
+
+    /// Takes the HCLK cycles from the last change of a divider to a switch of the system clock, if there was a switch.
+    pub(crate) fn take_switch(&mut self) -> Option<u64> {
+        self.switched.take()
     }
 
     fn write_control(&mut self, value: u32, now: Time) {

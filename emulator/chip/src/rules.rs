@@ -2,7 +2,7 @@
 //! not change the behaviour of the models: it is reported, and the user of the chip decides whether the run has failed.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use canbus::Time;
 use thiserror::Error;
@@ -76,6 +76,30 @@ pub enum Breach {
         /// The name of the peripheral.
         name: &'static str,
     },
+    /// A master's SPI samples by the clock that it reads back from its pin, which is too late at the lowest output speed
+    /// (ES0298 2.14, ES0182 2.12.4).
+    #[error("P{port}{pin} has the lowest output speed; {function} needs more")]
+    PinSpeed {
+        /// The port: `'A'` to `'I'`.
+        port: char,
+        /// The pin: 0 to 15.
+        pin: u32,
+        /// The function of the pin.
+        function: &'static str,
+    },
+    /// WFI in flash at an address that is not a multiple of eight, with DBG_SLEEP set: the core may execute wrong
+    /// instructions afterwards (ES0298 and ES0182, debugging Sleep/Stop mode with WFE/WFI entry).
+    #[error("WFI at {address:#010x} in flash with DBG_SLEEP set; it needs a multiple of eight")]
+    Sleep {
+        /// The address of the instruction.
+        address: u32,
+    },
+    /// The system clock is switched before new dividers of the buses are in force (RM0390 section 6.3.3, PPRE1).
+    #[error("the system clock is switched {cycles} cycles after a divider; it takes 16")]
+    Divider {
+        /// The HCLK cycles since the change of the divider.
+        cycles: u64,
+    },
     /// A write to the backup domain while it is protected.
     #[error("{name} is written while the backup domain is protected")]
     Protected {
@@ -140,6 +164,12 @@ const C: usize = 2;
 const CAN_FUNCTION: u32 = 9;
 const CAN_RX: u32 = 8;
 const CAN_TX: u32 = 9;
+/// The clock of the absolute encoder is at PB13.
+const SSI_PIN: u32 = 13;
+/// The flash array (RM0390, table 4).
+const FLASH: Range<u32> = 0x0800_0000..0x0810_0000;
+/// HCLK cycles until new dividers of the buses are in force.
+const DIVIDER_CYCLES: u64 = 16;
 /// The inputs of ADC1 in use on the board, with their pins.
 const ANALOGUE: [(u32, usize, char, u32); 3] = [(0, A, 'A', 0), (1, A, 'A', 1), (12, C, 'C', 2)];
 /// The channel of the internal reference.
@@ -206,6 +236,22 @@ impl Stm32f4 {
     pub(crate) fn check_ssi(&mut self, spi: usize) {
         if let Some(clock) = self.spis[spi].clock().filter(|_| self.ssi_is_wired(spi)) {
             self.check_clock("the SSI clock", Time::PER_SECOND / clock.0, &SSI_CLOCK);
+            let (port, pin) = ('B', SSI_PIN);
+            let breach = Breach::PinSpeed { port, pin, function: "SPI2_SCK" };
+            self.rules.check(!self.ports[B].is_slowest(pin), breach);
+        }
+    }
+
+    /// Checks the rule before the core sleeps: `address` is that of WFI.
+    pub(crate) fn check_sleep(&mut self, address: u32) {
+        let is_risky = FLASH.contains(&address) && !address.is_multiple_of(8);
+        self.rules.check(!(is_risky && self.dbgmcu.debugs_sleep()), Breach::Sleep { address });
+    }
+
+    /// Checks the rule after a store to CFGR.
+    pub(crate) fn check_dividers(&mut self) {
+        if let Some(cycles) = self.rcc.take_switch() {
+            self.rules.check(cycles >= DIVIDER_CYCLES, Breach::Divider { cycles });
         }
     }
 

@@ -73,6 +73,10 @@ impl Peripherals for Stm32f4 {
         lines
     }
 
+    fn slept(&mut self, address: u32) {
+        self.check_sleep(address);
+    }
+
     fn take_change(&mut self) -> bool {
         std::mem::take(&mut self.has_settled) || !self.effects.is_empty() || self.rules.any_broken()
     }

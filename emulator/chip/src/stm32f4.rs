@@ -125,6 +125,7 @@ impl Stm32f4 {
     pub fn lose(&mut self, loss: Loss, times: usize) {
         match loss {
             Loss::TransmitComplete => self.can.can1.transmitter.lost_ends += times,
+            Loss::LeaveBus => self.can.can1.hold(),
             Loss::Abort => self.can.can1.transmitter.late_aborts += times,
             _ => self.losses.add(loss, times),
         }

@@ -47,6 +47,7 @@ pub struct Machine<P: Peripherals + 'static> {
     model: Model,
     power_up: PowerUp,
     powered: bool,
+    power_ons: u64,
     sleeping: bool,
     locked: Option<u32>,
     stall: Time,
@@ -78,6 +79,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             model,
             power_up: PowerUp::new(0),
             powered: false,
+            power_ons: 0,
             sleeping: false,
             locked: None,
             stall: Time::ZERO,
@@ -177,7 +179,18 @@ impl<P: Peripherals + 'static> Machine<P> {
         core.now = core.now.max(at);
         core.chip.reset(true, core.now);
         self.powered = true;
+        self.power_ons += 1;
         self.restart();
+    }
+
+    /// How often the supply was switched on.
+    pub fn power_ons(&self) -> u64 {
+        self.power_ons
+    }
+
+    /// Whether the supply is on.
+    pub fn is_powered(&self) -> bool {
+        self.powered
     }
 
     /// Switches the supply off: RAM loses its content, flash keeps it.
@@ -443,7 +456,12 @@ impl<P: Peripherals + 'static> Machine<P> {
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
             (Err(uc_error::READ_PROT), None) if self.cpu.get_data().flash_closed => self.loading = true,
             (Err(error), None) => self.refused(error),
-            (Ok(()), None) => self.sleeping = true,
+            (Ok(()), None) => {
+                self.sleeping = true;
+                // WFI has two bytes.
+                let address = self.pc().wrapping_sub(2);
+                self.cpu.get_data_mut().chip.slept(address);
+            }
         }
     }
 

@@ -100,7 +100,7 @@ fn owner() -> SigningKey {
 fn signed(word: u32, counter: u32) -> Result<Image> {
     let version = Version { major: 1, minor: 0, patch: 0 };
     let about =
-        Description { product: product::BOARD, hardware: 1, version, counter, ..Description::default() };
+        Description { board: product::BOARD, hardware: 1, version, counter, ..Description::default() };
     Image::sign(about, code(word), &owner())
 }
 
@@ -189,5 +189,5 @@ fn downloaded() -> Result<MockFlash> {
 }
 
 fn target() -> Target {
-    Target { layout: LAYOUT, product: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
+    Target { layout: LAYOUT, board: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
 }

@@ -117,6 +117,11 @@ impl Board {
         self.id
     }
 
+    /// The personality from the command line.
+    pub fn personality(&self) -> Personality {
+        self.personality
+    }
+
     /// The programs that the board runs.
     pub fn programs(&self) -> Programs {
         self.programs
@@ -200,6 +205,21 @@ impl Board {
                 if (FLASH_BASE..HEADER_ADDRESS).contains(&pc) || pc >= RAM { images[1] } else { images[0] };
             ours.or(images[0])?.place(pc)
         })
+    }
+
+    /// How often the board was switched on.
+    pub(crate) fn power_ons(&self) -> u64 {
+        self.machine.power_ons()
+    }
+
+    /// Whether the board is switched on.
+    pub(crate) fn is_powered(&self) -> bool {
+        self.machine.is_powered()
+    }
+
+    /// The incidents since power-on.
+    pub(crate) fn incidents(&self) -> &[(Time, Incident)] {
+        self.machine.incidents()
     }
 
     /// Whether the board's program has broken a rule of the chip.

@@ -19,17 +19,30 @@ const PATIENCE: Time = Time::from_millis(1000);
 #[derive(Debug, Default)]
 pub struct Port {
     node: Option<HostNode>,
+    /// The settings of the adapter.
+    settings: Option<Adapter>,
+    /// The adapter leaves the bus when its waiting frames are sent.
+    is_leaving: bool,
     /// The instant at which a frame last went out, or at which the first one began to wait.
     moved: Time,
 }
 
 impl Port {
-    /// Attaches an adapter to the bus; `None` detaches it. Waiting frames are dropped.
+    /// Attaches an adapter to the bus; `None` detaches it. Waiting frames are dropped, except those of an adapter that
+    /// is leaving and returns with the same settings.
     pub fn attach(&mut self, adapter: Option<Adapter>) {
-        self.node = adapter.map(|adapter| {
-            let node = HostNode::new(Time::of_cycle(adapter.bit_rate.into())).with_order(Order::Fifo);
-            if adapter.silent { node.silent() } else { node }
-        });
+        if self.node.is_none() || !self.is_leaving || self.settings != adapter {
+            self.node = adapter.map(|adapter| {
+                let node = HostNode::new(Time::of_cycle(adapter.bit_rate.into())).with_order(Order::Fifo);
+                if adapter.silent { node.silent() } else { node }
+            });
+        }
+        (self.settings, self.is_leaving) = (adapter, false);
+    }
+
+    /// Detaches the adapter once its waiting frames are sent, as with a channel that is closed.
+    pub fn detach_when_sent(&mut self) {
+        self.is_leaving = true;
     }
 
     /// Changes the bit rate of the attached adapter.
@@ -47,10 +60,15 @@ impl Port {
         }
     }
 
-    /// Drops the waiting frames when none has gone out for a second. Returns their number.
+    /// Drops the waiting frames when none has gone out for a second. Returns their number. To be called between two steps
+    /// of the bus, in which an adapter that is leaving goes off the bus.
     pub fn give_up(&mut self, now: Time) -> u64 {
         let stuck = self.node.as_mut().filter(|node| node.backlog() > 0 && now.since(self.moved) > PATIENCE);
-        stuck.map_or(0, HostNode::forget)
+        let dropped = stuck.map_or(0, HostNode::forget);
+        if self.is_leaving && self.backlog() == 0 {
+            self.node = None;
+        }
+        dropped
     }
 
     /// The oldest frame received and not taken yet, with its instant.

@@ -1,10 +1,11 @@
 //! Builds a world from the command line.
 
+use std::ops::Range;
 use std::rc::Rc;
 
 use anyhow::{Context, Result, ensure};
 use chip::{Board as Wiring, Stm32f4};
-use storage::{DeviceRecord, Memory, Pages, View};
+use storage::{DeviceRecord, Memory, Pages};
 
 use crate::board::{Board, Contents, Images};
 use crate::cli::{Node, Options, UNCONFIGURED};
@@ -15,6 +16,7 @@ use crate::world::World;
 
 /// The two pages of the parameter store: sectors 2 and 3 (memory.x).
 const PAGES: Pages = Pages::new(0x8000, 0x4000);
+const PARAMETERS: Range<usize> = 0x8000..0x1_0000;
 
 /// A bit rate in bit/s from one in kbit/s.
 pub fn bits_per_second(kbit: u16) -> u32 {
@@ -78,10 +80,11 @@ fn oscillator(node: &Node, options: &Options) -> Oscillator {
     own.map_or_else(Oscillator::default, |oscillator| oscillator.what)
 }
 
-/// Writes the device record of a new board. A board whose flash was kept already has one, and is not changed.
+/// Writes the device record of a new board: one whose parameter pages are erased. The pages of another board stay as they
+/// are, damaged or not: the firmware reports the damage.
 fn provision(flash: &mut [u8], node: &Node, bit_rate: u16) -> Result<()> {
-    let known = View::open(Memory(&*flash), PAGES).and_then(|mut view| view.device());
-    if matches!(known, Ok(Some(_))) {
+    let pages = flash.get(PARAMETERS).context("no parameter pages")?;
+    if pages.iter().any(|byte| *byte != 0xFF) {
         return Ok(());
     }
     let node_id = if node.id < UNCONFIGURED { node.id } else { DeviceRecord::UNCONFIGURED };

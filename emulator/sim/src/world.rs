@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
 use chip::Stm32f4;
-use emulator::Machine;
+use emulator::{Incident, Machine};
 
 use crate::board::Board;
 use crate::host_time::{HostTime, Work};
@@ -33,6 +33,22 @@ pub struct PortId(usize);
 #[error("there is no node {0} here")]
 pub struct NoSuchBoard(pub u8);
 
+/// Listens to the bus and to the boards.
+pub trait Observer {
+    /// The bus has this bit rate from now on, in bit/s.
+    fn bit_rate(&mut self, bits_per_second: u32);
+    /// A frame has ended. `board`: its sender, in the order of the command line; `None` for any other participant.
+    fn frame(&mut self, at: Time, frame: &Frame, board: Option<usize>);
+    /// An incident of a board.
+    fn incident(&mut self, at: Time, board: usize, incident: &Incident);
+    /// A board was switched on or off.
+    fn power(&mut self, at: Time, board: usize, is_on: bool);
+    /// A test may change the machine of a board.
+    fn touched(&mut self, at: Time, board: usize);
+    /// The boards have reached this time.
+    fn time(&mut self, at: Time);
+}
+
 /// Boards, a bus, foreign traffic and clients.
 pub struct World {
     now: Time,
@@ -51,6 +67,17 @@ pub struct World {
     host_time: Option<HostTime>,
     enforces_rules: bool,
     stimuli_changes: u64,
+    observer: Option<Box<dyn Observer>>,
+    /// What the observer knows of each board.
+    observed: Vec<Observed>,
+}
+
+/// What an observer knows of a board.
+#[derive(Clone, Copy)]
+struct Observed {
+    incidents: usize,
+    power_ons: u64,
+    is_powered: bool,
 }
 
 /// A port, and whether a client uses it.
@@ -99,6 +126,18 @@ impl World {
             host_time: None,
             enforces_rules: false,
             stimuli_changes: 0,
+            observer: None,
+            observed: Vec::new(),
+        }
+    }
+
+    /// Shows an observer everything from now on, or nothing.
+    pub fn observe(&mut self, observer: Option<Box<dyn Observer>>) {
+        self.observed = self.boards.iter().map(Observed::of).collect();
+        self.observer = observer;
+        let bit_rate = self.bit_rate();
+        if let Some(observer) = &mut self.observer {
+            observer.bit_rate(bit_rate);
         }
     }
 
@@ -122,6 +161,9 @@ impl World {
     /// # Panics
     /// When the board does not exist.
     pub fn machine(&mut self, index: usize) -> &mut Machine<Stm32f4> {
+        if let Some(observer) = &mut self.observer {
+            observer.touched(self.now, index);
+        }
         self.boards[index].machine()
     }
 
@@ -197,6 +239,7 @@ impl World {
             let quantum =
                 if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
             let start = self.measure(Work::Bus, start);
+            self.show_incidents();
             let mut limit = end.min(next).min(quantum);
             for board in &mut self.boards {
                 limit = limit.min(board.run_until(limit));
@@ -205,6 +248,9 @@ impl World {
             self.now = limit;
         }
         while self.host.receive().is_some() {}
+        if let Some(observer) = &mut self.observer {
+            observer.time(self.now);
+        }
         self.boards.iter_mut().for_each(|board| board.read_log(&mut self.records.log));
         if self.enforces_rules && self.boards.iter().any(Board::has_broken_rules) {
             let broken: Vec<String> = self.boards.iter().flat_map(Board::broken_rules).collect();
@@ -240,8 +286,32 @@ impl World {
         let host = std::iter::once(&mut self.host as &mut dyn Controller);
         let mut participants: Vec<&mut dyn Controller> =
             boards.chain(host).chain(load).chain(ports).collect();
-        let records = &mut self.records;
-        self.bus.step(&mut participants, self.now, &mut |event| records.on_event(&event))
+        let (records, observer, count) = (&mut self.records, &mut self.observer, self.observed.len());
+        self.bus.step(&mut participants, self.now, &mut |event| {
+            records.on_event(&event);
+            if let (Some(observer), &Event::Frame { end, frame, transmitter, .. }) =
+                (observer.as_mut(), &event)
+            {
+                observer.frame(end, &frame, Some(transmitter).filter(|transmitter| *transmitter < count));
+            }
+        })
+    }
+
+    fn show_incidents(&mut self) {
+        let Some(observer) = &mut self.observer else { return };
+        for (number, (board, known)) in self.boards.iter().zip(&mut self.observed).enumerate() {
+            if known.power_ons != board.power_ons() {
+                observer.power(self.now, number, true);
+            }
+            if known.is_powered && !board.is_powered() {
+                observer.power(self.now, number, false);
+            }
+            (known.power_ons, known.is_powered) = (board.power_ons(), board.is_powered());
+            for (at, incident) in board.incidents().iter().skip(known.incidents) {
+                observer.incident(*at, number, incident);
+                known.incidents += 1;
+            }
+        }
     }
 
     /// Starts the nodes that have booted while no client was there to start them. Returns the instant at which the bus
@@ -262,6 +332,10 @@ impl World {
             self.bit = Time::of_cycle(u64::from(kbit) * 1000);
             self.host.set_bit(self.bit);
             self.ports.iter_mut().for_each(|place| place.port.set_bit(self.bit));
+            let bit_rate = self.bit_rate();
+            if let Some(observer) = &mut self.observer {
+                observer.bit_rate(bit_rate);
+            }
         }
         self.records.retuning.due()
     }
@@ -306,6 +380,13 @@ impl World {
             nodes: nodes.collect(),
             host_time: self.host_time,
         }
+    }
+}
+
+impl Observed {
+    /// The present supply, and no incident.
+    fn of(board: &Board) -> Observed {
+        Observed { incidents: 0, power_ons: board.power_ons(), is_powered: board.is_powered() }
     }
 }
 

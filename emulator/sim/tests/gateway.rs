@@ -138,12 +138,33 @@ fn what_was_sent_before_the_end_reaches_the_bus() {
     bench.run(20);
     assert_eq!(bench.world.take_frames().len(), 6);
 
+    // A client of slcan closes the channel before it leaves, or opens the channel again.
+    for (end, expected) in [("", 6), ("C\r", 6), ("C\rO\rC\r", 6), ("C\rO\rt00020105\rC\r", 7)] {
+        let mut client = bench.connect(slcan);
+        client.write_all(&[b"S8\rO\r", "t00020105\r".repeat(6).as_bytes(), end.as_bytes()].concat()).unwrap();
+        drop(client);
+        bench.run(20);
+        assert_eq!(bench.world.take_frames().len(), expected, "{end:?}");
+        assert_eq!(bench.gateway.clients(), 0, "and then it is gone");
+    }
+}
+
+/// A closed channel reports no frames, and sends none later.
+#[test]
+fn a_closed_slcan_channel_is_off_the_bus_once_its_frames_are_sent() {
+    let mut bench = Bench::new();
+    let (socketcand, slcan) = (bench.serve(Protocol::Socketcand), bench.serve(Protocol::Slcan));
     let mut client = bench.connect(slcan);
-    client.write_all(&[b"S8\rO\r", "t00020105\r".repeat(6).as_bytes()].concat()).unwrap();
-    drop(client);
+    client.write_all(b"S8\rO\rt1230\rC\r").unwrap();
+    let answers: String = (0..4).map(|_| bench.answer(&mut client, b'\r')).collect();
+    assert_eq!(answers, "\r\rz\r\r");
     bench.run(20);
-    assert_eq!(bench.world.take_frames().len(), 6);
-    assert_eq!(bench.gateway.clients(), 0, "and then it is gone");
+    assert_eq!(bench.world.take_frames().len(), 1);
+    let mut other = bench.raw_client(socketcand);
+    other.write_all(b"< send 124 0 >").unwrap();
+    bench.run(20);
+    client.write_all(b"t1250\r").unwrap();
+    assert_eq!(bench.answer(&mut client, b'\x07'), "\x07", "neither a frame nor a success");
 }
 
 /// More frames than a client's queue holds.

@@ -13,7 +13,7 @@ use update::{
 /// Sectors: security counter; application in two sectors; staging in two; the kept image in two.
 const SECTORS: [usize; 7] = [256, 512, 512, 512, 1024, 512, 1024];
 const APPLICATION: usize = 256;
-const PRODUCT: u32 = 0x8271;
+const BOARD: u32 = 0x8271;
 /// Number of polls that no step of an update exceeds.
 const POLLS: u32 = 2000;
 
@@ -77,13 +77,13 @@ fn target() -> Target {
         Area::new(1280, &[512, 1024]),
         Area::new(2816, &[512, 1024]),
     );
-    Target { layout: layout.expect("they fit"), product: PRODUCT, hardware: 0, keys: &*PUBLIC_KEYS }
+    Target { layout: layout.expect("they fit"), board: BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
 }
 
 fn image(major: u16, len: usize) -> Image {
     let version = Version { major, minor: 0, patch: 0 };
     let description =
-        Description { product: PRODUCT, hardware: 1, version, counter: 1, ..Description::default() };
+        Description { board: BOARD, hardware: 1, version, counter: 1, ..Description::default() };
     let code: Vec<u8> = (1..=u8::MAX).cycle().skip(usize::from(major)).take(len).collect();
     let header = Header::describe(description, &code).expect("it fits");
     let hash = salty::Sha512::new().updated(&header.signed_part()).updated(&code).finalize();

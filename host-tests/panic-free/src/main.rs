@@ -6,11 +6,13 @@
 #![no_std]
 #![no_main]
 
-use canopen::{Frame, Instant, QueueFull, Transmit};
+use canopen::{Duration, Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use node::{BusEvent, Fault, Measurement, Personality, Protocol, Setup, StoreJob};
+use node::{
+    BusEvent, EraseBudget, Fault, Measurement, ParameterMemory, Personality, Protocol, Setup, StoreJob,
+};
 use profiles::board::{Inputs, Outputs, PowerOn};
-use storage::{Pages, Store, View};
+use storage::{Pages, View};
 
 unsafe extern "C" {
     /// Not defined anywhere.
@@ -79,11 +81,17 @@ impl NorFlash for Flash {
 
 /// Start-up: reads and prepares the parameter store.
 #[unsafe(no_mangle)]
-extern "C" fn start(protocol: &mut Protocol, setup: &Setup, store: &mut Option<Store<Flash>>, now: u64) {
+extern "C" fn start(
+    protocol: &mut Protocol,
+    setup: &Setup,
+    memory: &mut Option<ParameterMemory<Flash>>,
+    budget: u16,
+    now: u64,
+) {
     *protocol = Protocol::new(setup);
     let Ok(mut view) = View::open(Flash, Pages::new(0, 16 * 1024)) else { return };
     let _ = protocol.load(&mut view);
-    *store = Store::prepare(view).ok();
+    *memory = ParameterMemory::prepare(view, EraseBudget::new(Some(budget))).ok();
     let _ = protocol.start(Instant(now), &mut Queue);
 }
 
@@ -129,11 +137,23 @@ extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personali
 
 /// Storing.
 #[unsafe(no_mangle)]
-extern "C" fn store(protocol: &mut Protocol, job: &mut StoreJob, store: &mut Store<Flash>, now: u64) {
+extern "C" fn store(
+    protocol: &mut Protocol,
+    job: &mut StoreJob,
+    memory: &mut ParameterMemory<Flash>,
+    budget: &mut u16,
+    now: u64,
+) {
+    let now = Instant(now);
     if protocol.take_job(job) {
-        let result = job.run(store);
-        let _ = protocol.finish(job, result, Instant(now), &mut Queue);
+        let result = memory.run(job);
+        let _ = protocol.finish(job, result, now, &mut Queue);
     }
+    if memory.can_make_room(now) && protocol.can_pause(Duration::from_millis(500), now) {
+        let _ = memory.make_room();
+    }
+    protocol.show_memory(memory.state());
+    *budget = memory.budget().word();
 }
 
 /// The negative control: an index that may panic.

@@ -5,6 +5,8 @@ use fastrand::Rng;
 
 /// Number of more urgent frames that delay all other frames, for some 2.5 ms at 1 Mbit/s.
 const BURST: u32 = 20;
+/// A bit at 1 Mbit/s: the bit rate of a disturbed bus.
+const BIT: Time = Time::from_micros(1);
 /// The identifier of the urgent frames; CANopen does not use it.
 const URGENT: StandardId = StandardId::new(0x001).expect("11 bits");
 
@@ -35,7 +37,7 @@ impl Disturbance {
     #[must_use]
     pub fn new(seed: u64, percent: u32) -> Disturbance {
         let rng = Rng::with_seed(seed);
-        Disturbance { rng, percent, drawn: 0, burst: HostNode::new(super::BIT), tally: Tally::default() }
+        Disturbance { rng, percent, drawn: 0, burst: HostNode::new(BIT), tally: Tally::default() }
     }
 
     pub(super) fn tally(&self) -> Tally {

@@ -8,15 +8,15 @@ use std::collections::VecDeque;
 
 use canbus::{Bus, Controller, Event, HostNode, Id, Stamped, StandardId, Time};
 use canopen::{Duration, Frame, Instant};
+use monitor::Sender;
 
 use crate::sdo::Channel;
+use crate::watch::Watch;
 
 pub use disturbance::{Disturbance, Tally};
 pub use port::{Port, from_bus, to_bus};
 pub use station::{Station, Unit};
 
-/// A bit at 1 Mbit/s.
-const BIT: Time = Time::from_micros(1);
 /// The time-out of the master for an SDO response.
 const TIME_OUT: Duration = Duration::from_millis(500);
 
@@ -29,7 +29,7 @@ pub struct Traffic {
     pub errors: u64,
 }
 
-/// A bus at 1 Mbit/s with stations and a master.
+/// A bus with stations and a master. A monitor listens to it.
 #[derive(Debug)]
 pub struct Network<U> {
     bus: Bus,
@@ -41,19 +41,29 @@ pub struct Network<U> {
     heard: VecDeque<Stamped>,
     disturbance: Option<Disturbance>,
     traffic: Traffic,
+    watch: Watch,
 }
 
 impl<U: Unit> Network<U> {
-    /// A bus with these units, all silent until [`start`](Network::start).
+    /// A bus at 1 Mbit/s with these units, all silent until [`start`](Network::start).
     pub fn new(units: impl IntoIterator<Item = U>) -> Network<U> {
+        Network::at(1000, units)
+    }
+
+    /// A bus at a bit rate in kbit/s.
+    pub fn at(kbit: u16, units: impl IntoIterator<Item = U>) -> Network<U> {
+        let bits_per_second = u32::from(kbit) * 1000;
+        let bit = Time::of_cycle(bits_per_second.into());
+        let units = units.into_iter().enumerate();
         Network {
             bus: Bus::new(),
             now: Time::ZERO,
-            stations: units.into_iter().map(|unit| Station::new(unit, Port::new(BIT))).collect(),
-            master: HostNode::new(BIT),
+            stations: units.map(|(number, unit)| Station::new(unit, Port::new(bit), number)).collect(),
+            master: HostNode::new(bit),
             heard: VecDeque::new(),
             disturbance: None,
             traffic: Traffic::default(),
+            watch: Watch::of_bus(bits_per_second),
         }
     }
 
@@ -64,10 +74,17 @@ impl<U: Unit> Network<U> {
         self
     }
 
+    /// The SDO servers get the requests on the bus only, none of the monitor.
+    #[must_use]
+    pub fn without_reads(mut self) -> Network<U> {
+        self.watch.read_nothing();
+        self
+    }
+
     /// Power-on, for all stations at once.
     pub fn start(&mut self) {
         let now = self.instant();
-        self.stations.iter_mut().for_each(|station| station.start(now));
+        self.stations.iter_mut().for_each(|station| station.start(now, &mut self.watch));
     }
 
     /// The current time of the bus.
@@ -152,7 +169,7 @@ impl<U: Unit> Network<U> {
     pub fn step(&mut self, end: Time) {
         let now = self.instant();
         for station in self.stations.iter_mut().filter(|station| station.due() <= now) {
-            station.run(now);
+            station.run(now, &mut self.watch);
             station.port.pump(self.now);
         }
         let next = self.step_bus();
@@ -165,17 +182,33 @@ impl<U: Unit> Network<U> {
         if let Some(disturbance) = &mut self.disturbance {
             disturbance.prepare(&mut self.bus, self.stations.len(), self.now);
         }
+        let count = self.stations.len();
         let ports = self.stations.iter_mut().map(|station| &mut station.port as &mut dyn Controller);
         let others = [&mut self.master as &mut dyn Controller];
         let burst =
             self.disturbance.as_mut().map(|disturbance| &mut disturbance.burst as &mut dyn Controller);
         let mut participants: Vec<&mut dyn Controller> = ports.chain(others).chain(burst).collect();
-        let traffic = &mut self.traffic;
+        let (traffic, watch) = (&mut self.traffic, &mut self.watch);
+        let mut frames = Vec::new();
         let next = self.bus.step(&mut participants, self.now, &mut |event| match event {
-            Event::Frame { .. } => traffic.frames += 1,
+            Event::Frame { end, frame, transmitter, .. } => {
+                traffic.frames += 1;
+                frames.push((Instant(end.as_micros()), frame, transmitter));
+            }
             Event::Error { .. } => traffic.errors += 1,
         });
         self.heard.extend(std::iter::from_fn(|| self.master.receive()));
+        for (at, frame, transmitter) in frames {
+            let sender = if transmitter < count { Sender::Node(transmitter) } else { Sender::Other };
+            if let Some(frame) = from_bus(&frame) {
+                watch.frame(at, &frame, sender);
+                // Only SDO and boot-up messages can lead to a question.
+                if matches!(frame.id(), 0x580..=0x67F | 0x700..=0x77F) {
+                    let now = Instant(self.now.as_micros());
+                    self.stations.iter_mut().for_each(|station| station.probe(now, watch));
+                }
+            }
+        }
         next
     }
 

@@ -26,8 +26,7 @@ pub struct Port {
     pub received: u64,
 }
 
-/// The transmit mailboxes. A mailbox only takes a frame that is more urgent than all others, so the last frame is the
-/// most urgent.
+/// The transmit mailboxes with frames of different identifiers. The last frame is the most urgent one.
 #[derive(Debug, Default)]
 struct Boxes {
     frames: Vec<Frame>,
@@ -36,21 +35,28 @@ struct Boxes {
 
 impl Mailboxes for Boxes {
     fn offer(&mut self, frame: &Frame) -> Offer {
-        if self.frames.last().is_some_and(|other| other.id() <= frame.id()) {
+        let is_full = self.frames.len() == MAILBOXES;
+        // The driver aborts no frame while the controller transmits.
+        let stays = |least: &Frame| least.id() < frame.id() || self.on_wire.is_some();
+        if is_full && self.frames.first().is_some_and(stays)
+            || self.frames.iter().any(|other| other.id() == frame.id())
+        {
             return Offer::Refused;
         }
         self.frames.push(*frame);
-        if self.frames.len() <= MAILBOXES {
+        self.frames.sort_by_key(|frame| core::cmp::Reverse(frame.id()));
+        if !is_full {
             return Offer::Taken;
         }
-        // The least urgent frame is replaced, unless it is being sent.
-        let is_sending = self.frames.first().is_some_and(|first| self.on_wire == Some(first.id()));
-        Offer::Replaced(self.frames.remove(usize::from(is_sending)))
+        Offer::Replaced(self.frames.remove(0))
     }
 
     fn is_idle(&self) -> bool {
         self.frames.is_empty()
     }
+
+    /// An abort takes no time here, so no frame is on its way out.
+    fn settle(&mut self, _is_cleared: bool) {}
 }
 
 impl Port {
@@ -218,7 +224,7 @@ mod tests {
             port.pump(Time::ZERO);
         }
         // The mailboxes hold 389h, 489h and 589h; 389h is on the wire.
-        assert_eq!(run(&mut bus, &mut port, &mut other, BIT * 50), []);
+        assert_eq!(run(&mut bus, &mut port, &mut other, BIT * 50), Vec::<u16>::new());
         for id in [0x289, 0x189] {
             port.send(Frame::new(id, &[0; 8]).unwrap()).unwrap();
             port.pump(BIT * 50);

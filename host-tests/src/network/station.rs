@@ -2,7 +2,10 @@
 
 use canopen::{Action, Frame, Instant, Transmit};
 
+use monitor::{Incident, Sheet};
+
 use super::port::Port;
+use crate::watch::Watch;
 
 /// The device in a station: a node, or a device of a test.
 pub trait Unit {
@@ -18,6 +21,10 @@ pub trait Unit {
     fn take_action(&mut self) -> Option<Action>;
     /// Carries out a requested store job.
     fn store(&mut self, _now: Instant, _out: &mut impl Transmit) {}
+    /// The data sheet of a new unit, for the monitor.
+    fn sheet(&self) -> Option<Sheet> {
+        None
+    }
     /// Identifiers for FIFO 0.
     fn process_ids(&self) -> Vec<u16>;
     /// Identifiers for FIFO 1.
@@ -31,20 +38,26 @@ pub struct Station<U> {
     pub unit: U,
     /// The connection to the bus.
     pub port: Port,
+    /// Position on the bus.
+    number: usize,
     filters: [Vec<u16>; 2],
     due: Instant,
 }
 
 impl<U: Unit> Station<U> {
     /// A station that neither sends nor receives until it is started.
-    pub(super) fn new(unit: U, port: Port) -> Station<U> {
-        Station { unit, port, filters: [vec![], vec![]], due: Instant::NEVER }
+    pub(super) fn new(unit: U, port: Port, number: usize) -> Station<U> {
+        Station { unit, port, number, filters: [vec![], vec![]], due: Instant::NEVER }
     }
 
     /// Power-on.
-    pub(super) fn start(&mut self, now: Instant) {
+    pub(super) fn start(&mut self, now: Instant, watch: &mut Watch) {
+        if let Some(sheet) = self.unit.sheet() {
+            watch.monitor().set_sheet(self.number, sheet, true);
+        }
+        watch.incident(now, self.number, Incident::PowerOn);
         self.unit.start(now, &mut self.port);
-        self.poll(now);
+        self.poll(now, watch);
     }
 
     /// The instant at which the station must run if no frame arrives earlier.
@@ -53,32 +66,44 @@ impl<U: Unit> Station<U> {
     }
 
     /// Processes the received frames and the work that is due.
-    pub(super) fn run(&mut self, now: Instant) {
+    pub(super) fn run(&mut self, now: Instant, watch: &mut Watch) {
         while let Some(frame) = self.port.receive() {
-            self.filter(&frame, now);
+            self.filter(&frame, now, watch);
         }
         if now >= self.due {
-            self.poll(now);
+            self.poll(now, watch);
         }
     }
 
-    fn filter(&mut self, frame: &Frame, now: Instant) {
+    /// Lets the monitor read values beside the bus.
+    pub(super) fn probe(&mut self, now: Instant, watch: &mut Watch) {
+        let unit = &mut self.unit;
+        watch.probe(now, self.number, |request, answers| unit.on_service_frame(request, now, answers));
+    }
+
+    fn filter(&mut self, frame: &Frame, now: Instant, watch: &mut Watch) {
         let [process, services] = [0, 1].map(|fifo: usize| self.filters[fifo].contains(&frame.id()));
         if process {
             self.unit.on_process_frame(frame, now, &mut self.port);
         }
         if services {
+            let unit = &mut self.unit;
+            watch.probe_before(now, self.number, frame, |request, answers| {
+                unit.on_service_frame(request, now, answers);
+            });
             self.unit.on_service_frame(frame, now, &mut self.port);
         }
         if process || services {
-            self.poll(now);
+            self.poll(now, watch);
         }
     }
 
-    fn poll(&mut self, now: Instant) {
+    fn poll(&mut self, now: Instant, watch: &mut Watch) {
         self.fulfil(now);
+        let due = self.unit.poll(now, &mut self.port);
+        watch.feed(|monitor| monitor.deadline(now, self.number, due));
         // The next call is at least a microsecond later: a deadline in the past must not stop the time.
-        self.due = self.unit.poll(now, &mut self.port).max(Instant(now.0 + 1));
+        self.due = due.max(Instant(now.0 + 1));
         self.fulfil(now);
     }
 

@@ -26,7 +26,8 @@ pub(crate) fn run(
     cli: &Cli,
     each: impl FnMut(&mut World) + 'static,
 ) -> (String, Result<(), Failure>) {
-    let master = Master::join(&mut world.borrow_mut());
+    let bit_rate = world.borrow().bit_rate();
+    let master = Master::join_at(&mut world.borrow_mut(), bit_rate);
     let port = master.port;
     let mut adapter = Some(Adapter { world: Rc::clone(world), master, each: Box::new(each) });
     let open = move || Ok(Box::new(adapter.take().expect("the bus is opened once")) as Box<dyn Bus>);

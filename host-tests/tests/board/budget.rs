@@ -6,7 +6,7 @@ use budget::{Budget, Compiler};
 use crate::support::{SECOND, images, world};
 
 const KIB: u64 = 1024;
-const FLASH: Budget = Budget { what: "application, bytes of flash", limit: 114 * KIB, width: 10 };
+const FLASH: Budget = Budget { what: "application, bytes of flash", limit: 124 * KIB, width: 10 };
 /// RAM of the variables; the stack has 24 KiB of its own.
 const RAM: Budget = Budget { what: "application, bytes of RAM", limit: 28 * KIB, width: 5 };
 

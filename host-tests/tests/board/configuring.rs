@@ -4,7 +4,7 @@ use canbus::Time;
 use sim::traffic::NmtState;
 use sim::world::World;
 
-use crate::support::{LSS_REQUEST, Master, SECOND, run, world};
+use crate::support::{LSS_REQUEST, Master, SECOND, START_ALL, run, world};
 
 const fn ms(milliseconds: u64) -> Time {
     Time::from_millis(milliseconds)
@@ -68,6 +68,8 @@ fn pages_that_fill_up_are_erased_by_a_restart_and_lose_nothing() {
     let mut world = world("--bitrate 1000");
     let master = Master::join(&mut world);
     world.run_until(SECOND);
+    // In Pre-operational the node would erase a page and go on.
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
     let mut last = 0;
     let full = (0..200_u16).find(|&number| {
         write(&mut world, &master, 0x1017, 0, &(1000 + number).to_le_bytes());
@@ -76,7 +78,7 @@ fn pages_that_fill_up_are_erased_by_a_restart_and_lose_nothing() {
             last = 1000 + number;
             return false;
         }
-        // "Cannot be stored because of the present device state": the node needs a restart.
+        // "Cannot be stored because of the present device state".
         assert_eq!(response[4..], [0x22, 0, 0, 8]);
         true
     });

@@ -2,6 +2,8 @@
 //! damaged group and the values used instead. It reports no other group.
 
 use canbus::{Id, Time};
+use host_tests::watch::expects;
+use monitor::Rule;
 use sim::world::World;
 
 use crate::support::{Master, SECOND, world};
@@ -182,6 +184,7 @@ enum Kind {
 /// Every group and every kind of damage.
 #[test]
 fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_instead() {
+    let _expected = expects([Rule::SaveLost]);
     for group in ALL {
         for kind in [Kind::Newest, Kind::Superseded, Kind::Only] {
             let mut examiner = Examiner::new();
@@ -228,6 +231,33 @@ fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_inste
             assert_eq!(examiner.read((0x1002, 0)), summary, "{context}");
         }
     }
+}
+
+/// `cargo sim --flash`: the kept flash of a board with a damaged device record stays as it is, and the node reports it.
+#[test]
+fn the_simulator_keeps_the_parameters_of_a_board_with_a_damaged_device_record() {
+    let dir = std::env::temp_dir().join(format!("sim-damaged-{}", std::process::id()));
+    let flags = format!("--pressure const:250000 --flash {}", dir.display());
+    let mut examiner = Examiner::new();
+    examiner.save(Group::Application, NEW);
+    let mut flash = examiner.world.boards()[0].flash();
+    // The node-ID in the first record of the first page (crates/storage): the device record of a new board.
+    flash[0x8018] ^= 0x40;
+    sim::flash::save(&dir, 1, &flash).unwrap();
+    let mut world = world(&flags);
+    assert_eq!(world.boards()[0].flash()[0x8000..0x1_0000], flash[0x8000..0x1_0000], "before the start");
+    let master = Master::join_at(&mut world, 250_000);
+    for round in 1..=50 {
+        world.run_until(Time::from_millis(20 * round));
+        master.send(&mut world, SOMEBODY, &[5]);
+    }
+    world.run_until(SECOND * 2);
+    let frames: Vec<_> = world.take_frames().iter().map(|sent| said(&sent.frame)).collect();
+    let emcy = frames.iter().find(|(id, _)| *id == EMCY + 1).expect("an EMCY");
+    assert_eq!((emcy.1[0], emcy.1[1], emcy.1[3]), (0x01, 0x63, DEFAULTS));
+    let mut examiner = Examiner { world, master, node: 1 };
+    assert_eq!(examiner.read((0x4000, 1)), NEW, "the other groups are there");
+    std::fs::remove_dir_all(dir).unwrap();
 }
 
 /// The EMCY of a lasting fault follows the boot-up message, at power-on and at a reset of the communication.

@@ -36,8 +36,9 @@ type Said = BTreeMap<u16, Vec<Vec<u8>>>;
 /// Whether the object has the same value in both nodes, and a write keeps it so.
 fn is_comparable(row: &Object) -> bool {
     let is_measured = row.index >= 0x2000 && row.access == Access::ReadOnly && row.mapping != Mapping::No;
-    // Excluded: names and versions of the image, its identification, and the measured value that is taken as zero.
-    let is_own = matches!(row.index, 0x1008..=0x100A | 0x1F56) || row.access == Access::WriteOnly;
+    // Excluded: names and versions of the image, its identification, the room in its memory, and the measured value
+    // that is taken as zero.
+    let is_own = matches!(row.index, 0x1008..=0x100A | 0x1F56 | 0x2010) || row.access == Access::WriteOnly;
     let is_stored = matches!(
         row.rule,
         Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting | Rule::ProgramControl
@@ -107,7 +108,8 @@ fn said_on_the_board(world: &mut World, master: &Master, script: &[Line]) -> Sai
 
 fn said_in_this_process(serial_number: u32, script: &[Line]) -> Said {
     let raw = bench::raw(100_000.0, 298.15);
-    let mut network = Network::new([PressureNode::pressure(NodeId::new(ID), serial_number, raw)]);
+    let mut network =
+        Network::new([PressureNode::pressure(NodeId::new(ID), serial_number, raw)]).without_reads();
     network.start();
     network.run(Duration::from_millis(1000));
     while network.hear().is_some() {}

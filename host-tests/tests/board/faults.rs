@@ -3,6 +3,8 @@
 use crate::chip_faults::{peek, poke};
 use crate::support::{Master, SECOND, comes_back, read, run, running};
 use canbus::Time;
+use host_tests::watch::expects;
+use monitor::Rule;
 
 /// The first word of RAM, below which the stack must not grow, and an address that no image uses.
 const RAM: u32 = 0x2000_0000;
@@ -92,6 +94,7 @@ fn the_watchdog_restarts_a_node_that_no_longer_samples() {
 /// Every frame is destroyed for a while: the node becomes bus-off, recovers without a reset and reports the bus-off.
 #[test]
 fn a_node_recovers_from_bus_off() {
+    let _expected = expects([Rule::HeartbeatLate]);
     let mut world = running();
     world.bus().faults.noise(1, 1.0);
     world.run_until(SECOND * 2);
@@ -108,6 +111,7 @@ fn a_node_recovers_from_bus_off() {
 /// On a line that destroys every frame, the node tries less and less often: each wait is twice as long, up to 3.2 s.
 #[test]
 fn a_node_on_a_broken_line_tries_less_and_less_often() {
+    let _expected = expects([Rule::HeartbeatLate]);
     let mut world = running();
     world.bus().faults.noise(1, 1.0);
     let first = run(&mut world, SECOND).bus.errors;

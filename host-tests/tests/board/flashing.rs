@@ -14,8 +14,39 @@ const FLASH: usize = 0x0800_0000;
 const PARAMETERS: Range<usize> = 0x8000..0x1_0000;
 
 fn content(key: SigningKey) -> Result<Content, String> {
-    let bootloader = std::fs::read(images().join("bootloader")).unwrap();
-    Content::new(&bootloader, &firmware(), key).map_err(|error| format!("{error:#}"))
+    content_of("bootloader", key, None)
+}
+
+fn content_of(name: &str, key: SigningKey, second: Option<SigningKey>) -> Result<Content, String> {
+    let bootloader = std::fs::read(images().join(name)).unwrap();
+    let second = second.map(|key| key.verifying_key());
+    Content::new(&bootloader, &firmware(), key, second).map_err(|error| format!("{error:#}"))
+}
+
+/// The first line says which bootloader is written and what it starts. With both keys of an owner it is the owner's.
+#[test]
+fn the_first_line_names_the_bootloader_and_what_it_starts() {
+    let first_line = |content: Content| content.to_string().lines().next().unwrap().to_owned();
+    let development = first_line(content(key::development()).unwrap());
+    assert_eq!(
+        development,
+        "DEVELOPMENT bootloader: it starts every program, signed or not; not for production"
+    );
+    let [first, second] = [[0x42; 32], [0x43; 32]].map(|secret| SigningKey::from_bytes(&secret));
+    let owner = first_line(content_of("bootloader-owner", first.clone(), Some(second.clone())).unwrap());
+    let digits = [&first, &second].map(key::public_digits);
+    assert_eq!(
+        owner,
+        format!("bootloader of an owner: it starts only programs signed with {}", digits.join(" or "))
+    );
+}
+
+#[test]
+fn a_bootloader_without_the_second_key_is_not_written() {
+    let second = SigningKey::from_bytes(&[7; 32]);
+    let refused =
+        content_of("bootloader-owner", SigningKey::from_bytes(&[0x42; 32]), Some(second)).unwrap_err();
+    assert!(refused.contains("another key"), "{refused}");
 }
 
 fn emulated() -> Vec<u8> {

@@ -4,6 +4,8 @@
 use canbus::Time;
 use chip::Loss;
 use emulator::Exception;
+use host_tests::watch::expects;
+use monitor::Rule;
 use sim::world::World;
 
 use crate::chip_faults::{peek, poke};
@@ -363,6 +365,7 @@ fn milliseconds_that_nobody_collects_are_counted() {
 /// The interrupt for bus-off is lost: the node also polls the state every 20 ms.
 #[test]
 fn a_bus_off_without_its_interrupt_is_noticed() {
+    let _expected = expects([Rule::HeartbeatLate]);
     const CAN1_IER: u32 = 0x4000_6414;
     const ERRIE: u32 = 1 << 15;
     let mut world = running();

@@ -158,7 +158,7 @@ fn a_count_that_was_lost_with_the_memory_is_told_until_the_position_is_preset() 
     emcys(&mut world, &master);
     assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED | POSITION_ERROR);
     write(&mut world, &master, PRESET, 4, expected);
-    wait(&mut world, 150);
+    wait(&mut world, 250);
     assert_eq!(emcys(&mut world, &master).last().unwrap()[..3], [0, 0, 0]);
     assert_eq!(read(&mut world, &master, POSITION), expected);
     assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED, "the index comes with the next turn");

@@ -2,6 +2,7 @@
 //! on.
 
 use chip::Peripherals;
+use emulator::{Access, Bug};
 
 use crate::support::{SECOND, world};
 
@@ -25,7 +26,9 @@ fn a_broken_rule_fails_the_run() {
 
 #[test]
 fn a_broken_rule_is_told_with_its_place_in_the_source() {
-    let mut world = without_wait_states();
+    let mut world = world("--bitrate 1000");
+    let access = Access::Wrong { bits: 0xF, value: 0 };
+    world.machine(0).seed(Bug { register: FLASH_ACR, access });
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| world.run_until(SECOND + SECOND)));
     let message = *outcome.unwrap_err().downcast::<String>().unwrap();
     assert!(message.contains("0 wait states of the flash at 144000000 Hz; it needs 4"), "{message}");

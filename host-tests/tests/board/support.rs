@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use canbus::{Frame, StandardId, Time};
 use clap::Parser;
+use host_tests::boards::watch;
 use sim::cli::Options;
 use sim::port::Adapter;
 use sim::summary::Summary;
@@ -48,6 +49,13 @@ pub(crate) fn world(flags: &str) -> World {
 
 /// Like [`world`], with another bootloader than that of a development board; the application is in the same directory.
 pub(crate) fn world_of(bootloader: &str, flags: &str) -> World {
+    let mut world = unwatched(bootloader, flags);
+    watch(&mut world);
+    world
+}
+
+/// Like [`world_of`], without the monitor: for a test that breaks the node itself.
+pub(crate) fn unwatched(bootloader: &str, flags: &str) -> World {
     let bootloader = images().join(bootloader);
     let firmware = bootloader.with_file_name("firmware");
     let images =

@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use canopen::dictionary::{Dictionary, Sizes};
+use canopen::dictionary::{Dictionary, Services, Sizes};
 use canopen::{Action, CanId, Device, Duration, Frame, Instant, NodeId, Transmit};
 use host_tests::asked::Asked;
 use host_tests::network::Unit;
@@ -12,7 +12,8 @@ use host_tests::network::Unit;
 use crate::world::World;
 
 /// Sizes that suffice for any of the dictionaries.
-const ROOM: Sizes = Sizes { image: 512, tpdos: 8, rpdos: 8, watches: 4, scanned: 48 };
+const ROOM: Sizes =
+    Sizes { image: 512, tpdos: 8, rpdos: 8, watches: 4, scanned: 48, services: Services::ALL };
 pub(crate) const TICK: Duration = Duration::from_millis(1);
 
 /// The behaviour of a device apart from CANopen.

@@ -64,7 +64,7 @@ fn tpdo1_carries_the_position_on_entering_operational_and_then_by_its_timer_alon
     assert_eq!(positions(&mut bench, TPDO1), [1234]);
     turn_to(&mut bench, 1300);
     wait(&mut bench, 10);
-    assert_eq!(positions(&mut bench, TPDO1), [], "the cyclic timer is 0");
+    assert_eq!(positions(&mut bench, TPDO1), [0; 0], "the cyclic timer is 0");
     bench.nmt(0x80);
     bench.nmt(1);
     assert_eq!(positions(&mut bench, TPDO1), [1300]);
@@ -107,7 +107,7 @@ fn tpdo2_answers_every_sync() {
         turn_to(&mut bench, counter);
         bench.take();
         bench.receive(&Frame::new(0x80, &[]).unwrap());
-        assert_eq!(positions(&mut bench, TPDO2), [counter.into()]);
+        assert_eq!(positions(&mut bench, TPDO2), [u32::from(counter)]);
     }
 }
 
@@ -195,6 +195,17 @@ fn the_device_type_and_the_mapping_follow_the_sensors_at_the_next_reset() {
     assert_eq!(positions(&mut bench, TPDO1), [55]);
 }
 
+/// Both entries have the same bits, but what was saved is there after a reset.
+#[test]
+fn a_saved_mapping_stays_when_a_second_sensor_is_chosen() {
+    let mut bench = booted();
+    bench.write(0x2100, 2, &[7]).unwrap();
+    bench.write(0x1010, 1, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(number(&mut bench, 0x1000, 0), 0x000A_0196);
+    assert_eq!([number(&mut bench, 0x1A00, 1), number(&mut bench, 0x1A01, 1)], [0x6004_0020; 2]);
+}
+
 #[test]
 fn the_serial_number_is_that_of_the_identity() {
     let mut bench = booted();
@@ -220,11 +231,11 @@ fn a_supply_out_of_its_limits_and_a_damaged_memory_are_emergencies() {
         bench.encoder.board = bad;
         wait(&mut bench, 20);
         assert_eq!(emergencies(&mut bench), [(code, register, 0)]);
-        assert_eq!(number(&mut bench, 0x1001, 0), register.into());
-        assert_eq!(number(&mut bench, 0x1003, 1), code.into());
+        assert_eq!(number(&mut bench, 0x1001, 0), u32::from(register));
+        assert_eq!(number(&mut bench, 0x1003, 1), u32::from(code));
         assert_eq!(bench.protocol.state(), State::PreOperational, "1029h:2 is 0");
         bench.encoder.board = good;
-        wait(&mut bench, 20);
+        wait(&mut bench, 120);
         assert_eq!(emergencies(&mut bench), [(0, 0, 0)]);
     }
 }

@@ -26,12 +26,16 @@ struct Boxes(Vec<Frame>);
 
 impl Mailboxes for Boxes {
     fn offer(&mut self, frame: &Frame) -> Offer {
-        if self.0.last().is_some_and(|other| other.id() <= frame.id()) {
+        let is_full = self.0.len() == 3;
+        if is_full && self.0[0].id() < frame.id() || self.0.iter().any(|other| other.id() == frame.id()) {
             return Offer::Refused;
         }
         self.0.push(*frame);
-        if self.0.len() <= 3 { Offer::Taken } else { Offer::Replaced(self.0.remove(0)) }
+        self.0.sort_by_key(|frame| core::cmp::Reverse(frame.id()));
+        if is_full { Offer::Replaced(self.0.remove(0)) } else { Offer::Taken }
     }
+
+    fn settle(&mut self, _is_cleared: bool) {}
 
     fn is_idle(&self) -> bool {
         self.0.is_empty()

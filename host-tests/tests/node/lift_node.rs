@@ -63,7 +63,7 @@ fn every_pdo_of_the_table_is_in_the_node_or_is_not_there() {
         assert_eq!(number(&mut bench, communication, 1), pdo.cob_id(ID) | pdo.flags(), "{pdo:?}");
         assert_eq!([2, 5].map(|sub| number(&mut bench, communication, sub)), [255, 0]);
         assert_eq!(bench.read(communication, 3).is_ok(), pdo.is_produced);
-        assert_eq!(number(&mut bench, mapping, 0), pdo.count().into());
+        assert_eq!(number(&mut bench, mapping, 0), u32::from(pdo.count()));
         for (sub, entry) in (1..).zip(pdo.entries()) {
             assert_eq!(number(&mut bench, mapping, sub), entry, "{pdo:?}");
         }
@@ -331,7 +331,7 @@ fn multiplexed_pdos_of_all_nodes_are_taken() {
     let mut bench = operational();
     for producer in 1..=127 {
         set(&mut bench, producer, (0x2322, 1), producer.into());
-        assert_eq!(number(&mut bench, 0x2322, 1), producer.into());
+        assert_eq!(number(&mut bench, 0x2322, 1), u32::from(producer));
     }
     bench.write(0x1401, 1, &0x8000_0501_u32.to_le_bytes()).unwrap();
     for (producer, lamp) in [(8, 127), (127, 127), (1, 127), (2, 2)] {

@@ -1,7 +1,9 @@
 //! Each of the 290 PDOs of the table, produced and consumed by a device of the stack: with its number and CAN-ID, and
 //! with the layout of the table.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Sizes, Tables, Type};
+use canopen::dictionary::{
+    self, Access, DefaultValue, Dictionary, Mapping, Object, Services, Sizes, Tables, Type,
+};
 use canopen::{Device, Duration, Frame, Instant, NodeId};
 use host_tests::bench::Queue;
 use host_tests::lift417::{Pdo, pdos};
@@ -14,7 +16,7 @@ const ID: u8 = 33;
 const ROWS: usize = 24;
 const SIZE: usize = 128;
 /// A device with one PDO, or with one object in a multiplexed PDO.
-type Node = canopen::device!((), room: Sizes { image: SIZE, tpdos: 1, rpdos: 1, watches: 0, scanned: 8 });
+type Node = canopen::device!((), room: Sizes { image: SIZE, tpdos: 1, rpdos: 1, watches: 0, scanned: 8, services: Services::ALL });
 
 /// The objects of a PDO; for a multiplexed PDO the one that it carries in these tests.
 fn carried(pdo: &Pdo) -> Vec<(u16, u8, u8)> {

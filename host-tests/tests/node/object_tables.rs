@@ -57,6 +57,11 @@ fn reading_gives_the_default_in_the_size_of_the_type() {
             (_, 0x1003) if row.sub > 0 => Err(NO_DATA),
             // No value has been written yet.
             (_, 0x2F00) => Err(NO_DATA),
+            // The state of the memory.
+            (_, 0x2010) if row.sub > 0 => {
+                assert_eq!(result.map(|value| value.len()), Ok(row.size().unwrap()), "{row:X?}");
+                continue;
+            }
             _ => Ok(row.default(personality).unwrap_or_else(|| vec![0; row.size().unwrap()])),
         };
         assert_eq!(result, expected, "{personality:?} {row:X?}");

@@ -85,6 +85,7 @@ fn a_store_that_fails_is_told_and_changes_nothing() {
     let now = Instant(1);
     // Written without the bench, which would store the value.
     let frame = canopen::Frame::new(0x600 + u16::from(ID), &[0x2F, 0, 0x20, 0, 1, 0, 0, 0]).unwrap();
+    bench.overhear(&frame);
     let mut next = bench.protocol.on_service_frame(&frame, now, &mut bench.out);
     assert_eq!(bench.take(), [], "the answer waits");
     while !matches!(next.action, Some(Action::Store(_))) {

@@ -132,7 +132,9 @@ fn a_broken_sensor_is_found_within_a_second_and_signalled_everywhere() {
     assert_eq!(bench.read(0x1003, 1), Ok(vec![0x06, 0x50, 0, 0]));
     assert_eq!(bench.protocol.state(), State::PreOperational);
     (0..1000).for_each(|_| bench.sample(&intact));
-    assert_eq!(emergencies(&mut bench), [(0, 0)]);
+    assert_eq!((emergencies(&mut bench), bench.read(0x6150, 1)), (vec![], Ok(vec![0])));
+    (0..100).for_each(|_| bench.sample(&intact));
+    assert_eq!(emergencies(&mut bench), [(0, 0)], "0.1 s after the fault");
     assert_eq!(bench.read(0x3000, 1), Ok(vec![0; 4]));
     assert_eq!(bench.read(0x1002, 0), Ok(vec![0; 4]));
     assert_eq!(bench.read(0x1003, 0), Ok(vec![1]));

@@ -42,7 +42,8 @@ fn state(port: &Port<PressureNode>) -> State {
 /// The default value of the table after start-up; `None` for a measured value or one from outside the table.
 fn default(row: &Object) -> Option<Vec<u8>> {
     let is_given = matches!(row.index, 0x1009 | 0x100A | 0x1018 | 0x1F56 | 0x1F57);
-    let is_live = matches!(row.index, 0x1001..=0x1003 | 0x3000 | 0x6100 | 0x6130 | 0x6150 | 0x7130 | 0x9130);
+    let is_live =
+        matches!(row.index, 0x1001..=0x1003 | 0x2010 | 0x3000 | 0x6100 | 0x6130 | 0x6150 | 0x7130 | 0x9130);
     if (is_given || is_live) && row.sub > 0 || matches!(row.index, 0x1001 | 0x1002 | 0x1009 | 0x100A) {
         return None;
     }

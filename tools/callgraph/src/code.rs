@@ -37,6 +37,14 @@ const BRANCHES: [InsnGroupId; 2] = [
     InsnGroupId(InsnGroupType::CS_GRP_JUMP as InsnGroupIdInt),
 ];
 
+/// An instruction as text.
+#[derive(Clone, Debug)]
+pub(crate) struct Line {
+    pub(crate) at: u32,
+    pub(crate) mnemonic: String,
+    pub(crate) operands: String,
+}
+
 /// A decoder for the Cortex-M4.
 pub(crate) struct Decoder(Capstone);
 
@@ -66,6 +74,22 @@ impl Decoder {
             }
         }
         Ok(reader.body)
+    }
+
+    /// The instructions of a function: address, mnemonic, operands.
+    pub(crate) fn list(&self, image: &Image<'_>, function: &Function) -> Result<Vec<Line>> {
+        let mut lines = Vec::new();
+        for (start, end) in image.code(function) {
+            let instructions = self.0.disasm_all(image.bytes(start, end)?, start.into())?;
+            for instruction in instructions.iter() {
+                lines.push(Line {
+                    at: u32::try_from(instruction.address())?,
+                    mnemonic: instruction.mnemonic().unwrap_or_default().to_owned(),
+                    operands: instruction.op_str().unwrap_or_default().to_owned(),
+                });
+            }
+        }
+        Ok(lines)
     }
 
     fn take(&self, reader: &mut Reader<'_>, instruction: &Insn<'_>) -> Result<()> {

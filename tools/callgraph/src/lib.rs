@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod code;
+mod errata;
 mod graph;
 mod image;
 mod lists;
@@ -39,6 +40,13 @@ pub fn check_panics(images: &Path, forget: Option<&str>) -> Result<()> {
         panics::compare(name, &panics::sites(&path, &image, &graph)?, &known, &Compiler::of(&path)?)?;
     }
     Ok(())
+}
+
+/// The places in an image that an erratum of the chip forbids, one line each: WFI at an unsafe address, and interrupt
+/// handlers that return right after a store.
+pub fn errata(images: &Path, name: &str) -> Result<Vec<String>> {
+    let bytes = image::read(&images.join(name))?;
+    errata::places(&image::Image::parse(&bytes)?, &tasks::of(name)?).with_context(|| name.to_owned())
 }
 
 /// The bound of the stack of an image.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::ini::{Ini, Section};
 use crate::read::value;
-use crate::{Access, DataType, Entry, Error, Formula, Value};
+use crate::{Access, DataType, Entry, Error, Flags, Formula, Value};
 
 /// The entries of an object that has `count` of them, each like `pattern`. Sections `[1003Name]` and `[1003Value]` hold
 /// the names and defaults of the entries that differ.
@@ -51,6 +51,7 @@ fn number_of_entries(index: u16, count: u8) -> Entry {
         low: None,
         high: None,
         mappable: false,
+        flags: Some(Flags::default()),
         unit: String::new(),
     }
 }

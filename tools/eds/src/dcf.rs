@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::Eds;
 use crate::write::{Sections, device_info, write_lists};
+use crate::{Eds, Reals};
 
 /// Section `[DeviceComissioning]` (with this spelling): the device that the values are for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,10 +19,10 @@ pub struct Commissioning {
 impl Eds {
     /// The text of a configuration file of this name. Values are those of [`Entry::value`](crate::Entry::value).
     #[must_use]
-    pub fn to_dcf(&self, file_name: &str) -> String {
+    pub fn to_dcf(&self, file_name: &str, reals: Reals) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write_dcf(file_name, &mut Sections { out: &mut text });
+        let _ = self.write_dcf(file_name, &mut Sections { out: &mut text, reals });
         text
     }
 

@@ -8,6 +8,7 @@
 mod compact;
 mod dcf;
 mod device;
+mod edition;
 mod error;
 mod find;
 mod generated;
@@ -22,9 +23,10 @@ mod write;
 
 pub use dcf::Commissioning;
 pub use device::{DEVICES, Device};
+pub use edition::Edition;
 pub use error::{Error, Problem};
 pub use find::{LookupError, address};
 pub use generated::{File, files};
-pub use model::{DeviceInfo, Eds, Entry, Object};
+pub use model::{DeviceInfo, Eds, Entry, Flags, Object};
 pub use types::{Access, Class, DataType, ObjectType};
-pub use value::{Formula, Value};
+pub use value::{Formula, Reals, Value};

@@ -22,6 +22,16 @@ impl Eds {
         self.objects.get(&index)?.entries.get(&sub)
     }
 
+    /// Removes the flags of all entries where the data sheet does not use them. Editors write `ObjFlags=0` everywhere.
+    /// An author who means the flags excludes the command that stores the parameters.
+    pub(crate) fn drop_unused_flags(&mut self) {
+        let refuses = |entry: &Entry| entry.flags.is_some_and(Flags::refuse_write);
+        if !self.get(0x1010, 1).is_some_and(refuses) {
+            let entries = self.objects.values_mut().flat_map(|object| object.entries.values_mut());
+            entries.for_each(|entry| entry.flags = None);
+        }
+    }
+
     /// All entries, sorted by index and sub-index.
     pub fn entries(&self) -> impl Iterator<Item = &Entry> {
         self.objects.values().flat_map(|object| object.entries.values())
@@ -93,8 +103,28 @@ pub struct Entry {
     pub high: Option<Formula>,
     /// Whether a PDO can carry the entry.
     pub mappable: bool,
+    /// What a master does not do with the entry (`ObjFlags`); `None` in a data sheet that does not use the flags.
+    pub flags: Option<Flags>,
     /// Physical unit. CiA 306 has no place for units: they are written as a comment and never read.
     pub unit: String,
+}
+
+/// `ObjFlags` of an entry (CiA 306).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(pub u32);
+
+impl Flags {
+    /// Bit 0: the entry is not written when a configuration is downloaded.
+    #[must_use]
+    pub fn refuse_write(self) -> bool {
+        self.0 & 1 != 0
+    }
+
+    /// Bit 1: the entry is not read when the device is scanned.
+    #[must_use]
+    pub fn refuse_read(self) -> bool {
+        self.0 & 2 != 0
+    }
 }
 
 impl Entry {

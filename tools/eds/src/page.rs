@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use canopen::dictionary::{Group, Mapping, Object as Row};
 
-use crate::{Class, DataType, Device, Eds, Entry, Formula, Value};
+use crate::{Class, DataType, Device, Eds, Entry, Formula, Reals, Value};
 
 const HEADER: &str = "\
 # Object dictionary
@@ -134,7 +134,7 @@ fn default(value: &Formula, data_type: DataType) -> String {
             format!("{:?}", *value as f32)
         }
         Formula::Constant(Value::Real(value)) => format!("{value:?}"),
-        Formula::Constant(_) => value.text(data_type),
+        Formula::Constant(_) => value.text(data_type, Reals::Bits),
     }
 }
 

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ini::{Ini, Section};
 use crate::{
-    Access, Commissioning, DataType, DeviceInfo, Eds, Entry, Error, Formula, Object, ObjectType, Problem,
-    compact,
+    Access, Commissioning, DataType, DeviceInfo, Eds, Entry, Error, Flags, Formula, Object, ObjectType,
+    Problem, compact,
 };
 
 /// The bit rates in kbit/s and their keys in a data sheet.
@@ -47,7 +47,10 @@ impl Eds {
         }
         // CiA 306 spells this name with one m; some vendors write two.
         let commissioning = ini.section("devicecomissioning").or_else(|| ini.section("devicecommissioning"));
-        Ok(Eds { device, objects, commissioning: commissioning.map(self::commissioning).transpose()? })
+        let commissioning = commissioning.map(self::commissioning).transpose()?;
+        let mut eds = Eds { device, objects, commissioning };
+        eds.drop_unused_flags();
+        Ok(eds)
     }
 
     /// Calls [`Eds::parse`] for a file in UTF-8 or in Latin-1, which older editors write.
@@ -152,6 +155,8 @@ fn entry(section: Section, index: u16, sub: u8) -> Result<Entry, Error> {
         low: formula(section, "LowLimit", data_type)?,
         high: formula(section, "HighLimit", data_type)?,
         mappable: flag(section, "PDOMapping")?,
+        // A mistake in the flags is no reason to refuse the file.
+        flags: Some(Flags(section.number("ObjFlags").unwrap_or_default())),
         unit: String::new(),
     })
 }

@@ -6,7 +6,7 @@ use canopen::dictionary::{Access as RowAccess, DefaultValue, Mapping, Object as 
 use product::{REVISION, VENDOR_ID};
 
 use crate::read::BIT_RATES;
-use crate::{Access, DataType, Device, DeviceInfo, Eds, Entry, Formula, Object, ObjectType, Value};
+use crate::{Access, DataType, Device, DeviceInfo, Eds, Entry, Flags, Formula, Object, ObjectType, Value};
 
 /// Vendor and order code. CiA has assigned no vendor-ID to the project, and the keys must not be empty.
 const NONE: &str = "none";
@@ -19,7 +19,9 @@ impl Device {
     #[must_use]
     pub fn eds(&self) -> Eds {
         let objects = self.objects().map(|rows| self.object(rows)).map(|object| (object.index, object));
-        Eds { device: self.info(), objects: objects.collect(), commissioning: None }
+        let mut eds = Eds { device: self.info(), objects: objects.collect(), commissioning: None };
+        eds.drop_unused_flags();
+        eds
     }
 
     /// The rows of each object.
@@ -73,6 +75,7 @@ impl Device {
             low: row.limits.map(|(low, _)| constant(low)),
             high: row.limits.map(|(_, high)| constant(high)),
             mappable: row.mapping != Mapping::No,
+            flags: Some(Flags(row.flags().into())),
             unit: row.unit.into(),
         }
     }

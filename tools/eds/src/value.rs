@@ -15,6 +15,16 @@ pub enum Value {
     Text(String),
 }
 
+/// The form of real numbers in a file. There is none that all tools read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reals {
+    /// The bits, as `0x3FC00000`. Lely's tools refuse a file with any other form. python-canopen does not know the value
+    /// then, unless it is 0, and the package canopen of npm reads an integer.
+    Bits,
+    /// Decimal, as `1.5`. python-canopen and most data sheets of vendors have this form.
+    Decimal,
+}
+
 /// A value that may depend on the node-ID (CiA 306, `$NODEID`).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Formula {
@@ -44,11 +54,18 @@ impl Formula {
         }
     }
 
-    /// The text of a value of a data type. A real number is written as its bits, because Lely's tools refuse the whole
-    /// file otherwise. All other readers accept the bits: python-canopen then has no default for numbers other than 0,
-    /// and the package canopen of npm reads the bits as an integer.
-    pub(crate) fn text(&self, data_type: DataType) -> String {
+    /// The text of a value of a data type.
+    pub(crate) fn text(&self, data_type: DataType, reals: Reals) -> String {
         match (self, data_type.class()) {
+            (Formula::Constant(Value::Real(value)), class)
+                if reals == Reals::Decimal && value.is_finite() =>
+            {
+                if class == Class::Real(32) {
+                    format!("{:?}", *value as f32)
+                } else {
+                    format!("{value:?}")
+                }
+            }
             (Formula::NodeId(base), _) => format!("$NODEID+0x{base:X}"),
             (Formula::Constant(Value::Text(text)), _) => text.clone(),
             (Formula::Constant(Value::Real(value)), Class::Real(32)) => bits((*value as f32).to_bits(), 8),
@@ -205,13 +222,15 @@ mod tests {
             ("0x80000000", REAL32),
             ("0x3FB999999999999A", DataType(0x11)),
         ] {
-            assert_eq!(Formula::parse(text, data_type).unwrap().text(data_type), text);
+            assert_eq!(Formula::parse(text, data_type).unwrap().text(data_type, Reals::Bits), text);
         }
         // Vendors write real numbers with a point.
         for (text, written) in
             [("0.1", "0x3DCCCCCD"), ("1e38", "0x7E967699"), ("-40.0", "0xC2200000"), ("0.0", "0")]
         {
-            assert_eq!(Formula::parse(text, REAL32).unwrap().text(REAL32), written);
+            assert_eq!(Formula::parse(text, REAL32).unwrap().text(REAL32, Reals::Bits), written);
+            let decimal = Formula::parse(text, REAL32).unwrap().text(REAL32, Reals::Decimal);
+            assert_eq!(Formula::parse(&decimal, REAL32), Formula::parse(text, REAL32), "{text}");
         }
     }
 }

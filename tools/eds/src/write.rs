@@ -5,12 +5,11 @@ use std::fmt::{self, Display, Write};
 use product::REVISION;
 
 use crate::read::BIT_RATES;
-use crate::{Device, DeviceInfo, Eds, Entry, Object, ObjectType};
+use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, ObjectType, Reals};
 
-/// Day of the release, month first (CiA 306). A constant, so that every run writes the same text; it changes with
-/// `REVISION`.
-const RELEASE_DATE: &str = "11-21-2026";
-const RELEASE_TIME: &str = "12:00AM";
+/// Day of the first release, month first (CiA 306).
+const CREATION_DATE: &str = "11-21-2026";
+const TIME: &str = "12:00AM";
 const AUTHOR: &str = "cargo xtask eds";
 
 const COMMENTS: [&str; 2] = [
@@ -30,36 +29,36 @@ const DUMMIES: [(&str, u8); 7] = [
 ];
 
 impl Device {
-    /// The text of the data sheet.
+    /// The text of the data sheet in an edition.
     #[must_use]
-    pub fn sheet(&self) -> String {
+    pub fn sheet(&self, edition: &Edition) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write(&mut Sections { out: &mut text });
+        let _ = self.write(edition, &mut Sections { out: &mut text, reals: Reals::Bits });
         text
     }
 
-    fn write(&self, out: &mut Sections) -> fmt::Result {
+    fn write(&self, edition: &Edition, out: &mut Sections) -> fmt::Result {
         let eds = self.eds();
-        self.file_info(out)?;
+        self.file_info(edition, out)?;
         device_info(&eds.device, out)?;
         dummies(out)?;
         comments(out)?;
         object_lists(&eds, out)
     }
 
-    fn file_info(&self, out: &mut Sections) -> fmt::Result {
+    fn file_info(&self, edition: &Edition, out: &mut Sections) -> fmt::Result {
         out.section("FileInfo", "")?;
         out.key("FileName", self.file_name)?;
         out.key("FileVersion", REVISION >> 16)?;
-        out.key("FileRevision", REVISION & 0xFFFF)?;
+        out.key("FileRevision", edition.revision)?;
         out.key("EDSVersion", "4.0")?;
         out.key("Description", self.description)?;
-        out.key("CreationTime", RELEASE_TIME)?;
-        out.key("CreationDate", RELEASE_DATE)?;
+        out.key("CreationTime", TIME)?;
+        out.key("CreationDate", CREATION_DATE)?;
         out.key("CreatedBy", AUTHOR)?;
-        out.key("ModificationTime", RELEASE_TIME)?;
-        out.key("ModificationDate", RELEASE_DATE)?;
+        out.key("ModificationTime", TIME)?;
+        out.key("ModificationDate", &edition.date)?;
         out.key("ModifiedBy", AUTHOR)
     }
 }
@@ -79,6 +78,7 @@ pub(crate) fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Resul
     out.key("SimpleBootUpSlave", 1)?;
     out.key("Granularity", device.granularity)?;
     out.key("DynamicChannelsSupported", 0)?;
+    out.key("CompactPDO", 0)?;
     out.key("GroupMessaging", u8::from(device.group_messaging))?;
     out.key("NrOfRXPDO", device.rpdos)?;
     out.key("NrOfTXPDO", device.tpdos)?;
@@ -156,15 +156,18 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
     out.key("DataType", format_args!("0x{:04X}", entry.data_type.0))?;
     out.key("AccessType", entry.access.text())?;
     let values = [
-        ("DefaultValue", &entry.default),
-        ("ParameterValue", &entry.value),
-        ("LowLimit", &entry.low),
-        ("HighLimit", &entry.high),
+        ("DefaultValue", &entry.default, Reals::Bits),
+        ("ParameterValue", &entry.value, out.reals),
+        ("LowLimit", &entry.low, Reals::Bits),
+        ("HighLimit", &entry.high, Reals::Bits),
     ];
-    for (key, value) in values {
+    for (key, value, reals) in values {
         if let Some(value) = value {
-            out.key(key, value.text(entry.data_type))?;
+            out.key(key, value.text(entry.data_type, reals))?;
         }
+    }
+    if let Some(Flags(flags @ 1..)) = entry.flags {
+        out.key("ObjFlags", format_args!("0x{flags:X}"))?;
     }
     // CiA 306 has no such key for a domain, because no PDO carries one. The package canopen of npm refuses the key
     // there.
@@ -177,6 +180,8 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
 /// Sections of keys, with the line ends of CiA 306.
 pub(crate) struct Sections<'a> {
     pub(crate) out: &'a mut String,
+    /// The form of real numbers that are the value of a parameter.
+    pub(crate) reals: Reals,
 }
 
 impl Sections<'_> {

@@ -3,13 +3,13 @@
 use std::sync::LazyLock;
 
 use canopen::NodeId;
-use eds::{DEVICES, Eds, LookupError, address};
+use eds::{DEVICES, Edition, Eds, LookupError, address};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::string::string_regex;
 use proptest::test_runner::RngSeed;
 
-static SHEET: LazyLock<String> = LazyLock::new(|| DEVICES[0].sheet());
+static SHEET: LazyLock<String> = LazyLock::new(|| DEVICES[0].sheet(&Edition::default()));
 
 /// Every run draws the same cases.
 fn repeatable() -> ProptestConfig {

@@ -1,12 +1,12 @@
 //! Tests that a written data sheet, read again, agrees with its table.
 
 use canopen::NodeId;
-use eds::{Access, DEVICES, Eds, Formula, ObjectType, Value};
+use eds::{Access, DEVICES, Edition, Eds, Flags, Formula, ObjectType, Value};
 use product::{REVISION, VENDOR_ID};
 use profiles::Personality;
 
 fn pressure() -> Eds {
-    Eds::parse(&DEVICES[0].sheet()).unwrap()
+    Eds::parse(&DEVICES[0].sheet(&Edition::default())).unwrap()
 }
 
 fn default(eds: &Eds, index: u16, sub: u8) -> Value {
@@ -22,7 +22,7 @@ fn every_device_is_read_as_it_was_written() {
         for entry in written.objects.values_mut().flat_map(|object| object.entries.values_mut()) {
             entry.unit.clear();
         }
-        assert_eq!(Eds::parse(&device.sheet()).unwrap(), written, "{}", device.file_name);
+        assert_eq!(Eds::parse(&device.sheet(&Edition::default())).unwrap(), written, "{}", device.file_name);
     }
 }
 
@@ -96,9 +96,47 @@ fn an_entry_has_the_attributes_of_its_row() {
 #[test]
 fn the_text_is_ascii_with_dos_line_ends() {
     for device in &DEVICES {
-        let sheet = device.sheet();
+        let sheet = device.sheet(&Edition::default());
         assert!(sheet.is_ascii() && sheet.ends_with("\r\n"));
         assert_eq!(sheet.matches('\n').count(), sheet.matches("\r\n").count());
         assert!(sheet.lines().all(|line| line.len() < 255), "CiA 306 allows 255 characters");
     }
+}
+
+/// What a configuration leaves out: commands, what makes the device act, and the calibration.
+#[test]
+fn commands_are_excluded_from_a_download_and_what_is_stored_is_not() {
+    for device in &DEVICES {
+        let eds = Eds::parse(&device.sheet(&Edition::default())).unwrap();
+        for row in device.rows.iter().filter(|row| row.access.is_writable()) {
+            let flags = eds.get(row.index, row.sub).unwrap().flags.unwrap();
+            let acts = matches!(
+                row.index,
+                0x1003 | 0x1010 | 0x1011 | 0x1F51 | 0x2000 | 0x2108 | 0x2109 | 0x2200
+                    ..=0x2204 | 0x2322 | 0x2F00 | 0x6003 | 0x6010 | 0x6125 | 0x6382 | 0x6486 | 0x6925
+            );
+            let acts = acts
+                || matches!((row.index, row.sub), (0x2002, 2) | (0x2003, 3))
+                || matches!((row.index, row.sub, row.group), (0x6011 | 0x6200, 0, None));
+            assert_eq!(flags.refuse_write(), acts, "{} {:04X}h:{}", device.file_name, row.index, row.sub);
+        }
+        // A domain, and a list that is empty most of the time.
+        for (index, sub) in [(0x2F00, 0), (0x1003, 1)] {
+            assert!(
+                eds.get(index, sub).unwrap().flags.is_some_and(Flags::refuse_read),
+                "{}",
+                device.file_name
+            );
+        }
+    }
+}
+
+/// Editors write `ObjFlags=0` for every entry without a thought.
+#[test]
+fn flags_count_only_where_the_author_has_used_them() {
+    let sheet = DEVICES[0].sheet(&Edition::default());
+    let zeros = sheet.replace("ObjFlags=0x1", "ObjFlags=0x0");
+    assert!(Eds::parse(&zeros).unwrap().entries().all(|entry| entry.flags.is_none()));
+    let wrong = sheet.replacen("ObjFlags=0x1", "ObjFlags=often", 1);
+    assert!(Eds::parse(&wrong).is_ok());
 }

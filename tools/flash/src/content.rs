@@ -5,11 +5,12 @@ use std::fmt;
 use anyhow::{Context, Result, ensure};
 use bsp::sectors::FLASH;
 use bsp::update_layout::LAYOUT;
-use ed25519_dalek::SigningKey;
+use ed25519_dalek::{SigningKey, VerifyingKey};
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, elf};
 use sign::image::Image;
 use sign::{key, product};
+use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, KEY_LEN};
 
 /// Bytes and the address that they are written to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,19 +29,43 @@ pub struct Content {
     bootloader: Vec<Part>,
     image: Image,
     key: SigningKey,
+    second: Option<VerifyingKey>,
 }
 
 impl Content {
-    /// Makes the content from the ELF files of both programs. The application is signed with this key.
+    /// Makes the content from the ELF files of both programs. The application is signed with `key`. `second` is the other
+    /// key of an owner.
     ///
     /// # Errors
-    /// One of the files is not for this board, or the bootloader does not trust this key.
-    pub fn new(bootloader: &[u8], application: &[u8], key: SigningKey) -> Result<Content> {
+    /// One of the files is not for this board, or the bootloader does not trust these keys, or it trusts the development
+    /// key beside a key of an owner.
+    pub fn new(
+        bootloader: &[u8],
+        application: &[u8],
+        key: SigningKey,
+        second: Option<VerifyingKey>,
+    ) -> Result<Content> {
         let bootloader = segments(bootloader).context("the bootloader")?;
         let image = product::image(application, &key).context("the application")?;
-        let content = Content { bootloader, image, key };
-        ensure!(content.is_trusted(), "the bootloader was built with another key than the one to sign with");
+        let content = Content { bootloader, image, key, second };
+        for key in content.keys() {
+            ensure!(
+                content.trusts(&key.to_bytes()),
+                "the bootloader was built with another key than {}",
+                hex::encode(key.to_bytes())
+            );
+        }
+        let is_mixed = !content.is_for_development() && content.trusts(&DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
+        ensure!(!is_mixed, "the bootloader is one for development: it trusts a key that everybody knows");
         Ok(content)
+    }
+
+    fn is_for_development(&self) -> bool {
+        key::is_development(&self.key)
+    }
+
+    fn keys(&self) -> impl Iterator<Item = VerifyingKey> {
+        [self.key.verifying_key()].into_iter().chain(self.second)
     }
 
     /// The parts, by rising addresses.
@@ -56,16 +81,25 @@ impl Content {
         &self.image
     }
 
-    /// Whether the bootloader trusts the key: the bootloader contains the public keys that it trusts.
-    fn is_trusted(&self) -> bool {
-        let key = self.key.verifying_key().to_bytes();
-        self.bootloader.iter().any(|part| part.bytes.windows(key.len()).any(|bytes| bytes == key))
+    /// Whether the bootloader trusts a key: it contains the public keys that it trusts.
+    fn trusts(&self, key: &[u8; KEY_LEN]) -> bool {
+        self.bootloader.iter().any(|part| part.bytes.windows(KEY_LEN).any(|bytes| bytes == key))
     }
 }
 
-/// The output of `--dry-run`: a line for each part with its range, its size and its CRC-32 (ISO HDLC), then the image.
+/// The output before anything is written: the kind of the bootloader, a line for each part with its range, its size and
+/// its CRC-32 (ISO HDLC), then the image.
 impl fmt::Display for Content {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_for_development() {
+            writeln!(
+                f,
+                "DEVELOPMENT bootloader: it starts every program, signed or not; not for production"
+            )?;
+        } else {
+            let keys: Vec<_> = self.keys().map(|key| hex::encode(key.to_bytes())).collect();
+            writeln!(f, "bootloader of an owner: it starts only programs signed with {}", keys.join(" or "))?;
+        }
         for Part { what, address, bytes } in self.parts() {
             let (length, crc) = (bytes.len(), checksum::of(&bytes));
             let end = address as usize + length;
@@ -74,8 +108,7 @@ impl fmt::Display for Content {
         let about = self.image.header.description();
         writeln!(f, "{:<12}{}, security counter {}", "version", about.version, about.counter)?;
         let digits = key::public_digits(&self.key);
-        let whose =
-            if key::is_development(&self.key) { " (the development key, known to everybody)" } else { "" };
+        let whose = if self.is_for_development() { " (the development key, known to everybody)" } else { "" };
         write!(f, "{:<12}{digits}{whose}", "public key")
     }
 }

@@ -22,9 +22,15 @@ struct Cli {
     /// The ELF file of the application
     #[arg(long)]
     application: PathBuf,
-    /// The secret key to sign with, PKCS#8 in PEM [default: the development key, which is known to everybody]
+    /// The bootloader is one for development, and the development key signs
+    #[arg(long, required_unless_present = "key", conflicts_with = "key")]
+    development: bool,
+    /// The secret key of the owner to sign with, PKCS#8 in PEM
     #[arg(long)]
     key: Option<PathBuf>,
+    /// The second key that the bootloader must trust: the 64 digits of its public half
+    #[arg(long, requires = "key", value_name = "DIGITS")]
+    second_key: Option<String>,
     /// Print what would be written, and the calls of probe-rs, and make none
     #[arg(long)]
     dry_run: bool,
@@ -46,8 +52,11 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> Result<()> {
-    let key = key::read(cli.key.as_deref().unwrap_or(&key::development_path()))?;
-    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key)?;
+    let development = key::development_path();
+    let key =
+        key::read(if cli.development { &development } else { cli.key.as_ref().unwrap_or(&development) })?;
+    let second = cli.second_key.as_deref().map(key::public).transpose()?;
+    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, second)?;
     println!("{content}");
     let image = cli.application.with_extension("flash.img");
     std::fs::write(&image, content.image().to_bytes())

@@ -4,6 +4,7 @@ use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use eds::{DEVICES, DataType, DeviceInfo, Eds, Entry, LookupError};
 
+use crate::unit;
 use crate::value::Value;
 
 /// The first index after the communication profile. The communication profile is equal in all devices (CiA 301).
@@ -15,6 +16,8 @@ const FIRST_OF_VENDOR: u16 = 0x2000;
 pub struct Catalogue {
     sheet: Eds,
     common: Eds,
+    /// Whether the sheet is that of a device, not only the communication profile.
+    is_of_a_device: bool,
 }
 
 impl Catalogue {
@@ -29,13 +32,13 @@ impl Catalogue {
                 entry.unit = own.get(entry.index, entry.sub).map_or_else(String::new, |own| own.unit.clone());
             }
         }
-        Catalogue { sheet, common: common() }
+        Catalogue { sheet, common: common(), is_of_a_device: true }
     }
 
     /// The catalogue of an unknown device.
     #[must_use]
     pub fn unknown() -> Catalogue {
-        Catalogue::new(common())
+        Catalogue { sheet: common(), common: common(), is_of_a_device: false }
     }
 
     /// The data sheet of a device of this project with this identity (1018h:1 and 2).
@@ -65,7 +68,14 @@ impl Catalogue {
     /// Whether there is a data sheet of the device, not only the communication profile.
     #[must_use]
     pub fn is_of_a_device(&self) -> bool {
-        self.sheet.device != DeviceInfo::default()
+        self.is_of_a_device
+    }
+
+    /// Whether the device is one of this project.
+    #[must_use]
+    pub fn is_of_this_project(&self) -> bool {
+        let DeviceInfo { vendor_number, product_number, .. } = self.sheet.device;
+        self.is_of_a_device && built_in(vendor_number, product_number).is_some()
     }
 
     /// The objects of the data sheet; none without a data sheet of the device.
@@ -107,6 +117,19 @@ impl Catalogue {
             (None, Some(high)) => Some(format!("up to {high}")),
             (None, None) => None,
         }
+    }
+
+    /// The number for a word that a person types for an object: the symbol of a unit (`mbar`), or a signature (`save`,
+    /// `zero`) for an object of four bytes. `None` for any other text.
+    #[must_use]
+    pub fn word(&self, at: Multiplexer, text: &str) -> Option<Value> {
+        const SIGNATURES: [&str; 5] = ["save", "load", "zero", "cali", "fact"];
+        let entry = self.entry(at).filter(|entry| entry.data_type == DataType(0x07))?;
+        if entry.name.to_lowercase().contains("physical unit") {
+            return unit::code(text).map(|code| Value::Integer(code.into()));
+        }
+        let letters: [u8; 4] = SIGNATURES.contains(&text).then(|| text.as_bytes().try_into().ok())??;
+        Some(Value::Integer(u32::from_le_bytes(letters).into()))
     }
 
     /// Whether an object accepts a value, by the limits of the data sheet.

@@ -29,8 +29,10 @@ pub mod meaning;
 mod network;
 pub mod nmt;
 pub mod object;
+mod other_clients;
 mod pdo_parameters;
 pub mod quantity;
+pub mod rules;
 pub mod scan;
 pub mod sdo;
 pub mod text;
@@ -41,4 +43,4 @@ pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
-pub use network::{Logged, Network};
+pub use network::{Heard, Logged, Network};

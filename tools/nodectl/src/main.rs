@@ -1,5 +1,6 @@
 //! The command `nodectl`.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -13,6 +14,8 @@ fn main() -> ExitCode {
     };
     match cli.run(Output::standard(cli.options.json)) {
         Ok(()) => ExitCode::SUCCESS,
+        // The reader has seen enough, as `head` does.
+        Err(failure) if failure.is_closed_pipe() => ExitCode::SUCCESS,
         Err(failure) => {
             report(&failure, cli.options.json);
             ExitCode::from(failure.exit_code())
@@ -33,9 +36,10 @@ fn usage(error: &clap::Error) -> ExitCode {
 }
 
 fn report(failure: &Failure, json: bool) {
-    if json {
-        println!("{}", failure.to_json());
+    // Nobody may read any more: `println!` and `eprintln!` would panic.
+    let _ = if json {
+        writeln!(std::io::stdout(), "{}", failure.to_json())
     } else {
-        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
-    }
+        writeln!(std::io::stderr(), "nodectl: {}", visible_lines(&failure.to_string()))
+    };
 }

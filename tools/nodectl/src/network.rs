@@ -1,7 +1,7 @@
 //! The shared access of the services to a bus: waiting for one frame without losing the others, and opening the bus
 //! again.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use canopen::client::heartbeat::Heartbeat;
 use canopen::client::{Service, Step, Taken};
@@ -9,6 +9,8 @@ use canopen::nmt::State;
 use canopen::{Duration, Frame, Instant, NodeId};
 
 use crate::bus::{Bus, BusError, Received};
+use crate::other_clients::OtherClients;
+use crate::sdo::Channel;
 
 /// The number of frames that are kept for later; the oldest frames are dropped first.
 const KEPT: usize = 4096;
@@ -16,6 +18,12 @@ const KEPT: usize = 4096;
 /// The number of frames that a service gets between two of its steps. The limit keeps a flooded bus from delaying the
 /// deadline.
 const AT_ONCE: usize = 256;
+
+/// The pause between the last frame of another client's transfer and a request. A client that has more to ask asks
+/// sooner.
+const PAUSE: Duration = Duration::from_millis(30);
+/// How long to wait for such a pause. Clients that never pause have to let others in between two transfers.
+const WITHOUT_PAUSE: Duration = Duration::from_millis(1000);
 
 /// The number of frames in a log; later frames are not logged.
 const LOGGED: usize = 100_000;
@@ -34,6 +42,13 @@ pub struct Logged {
     pub is_sent: bool,
 }
 
+/// What was heard of a node, whether it answers or not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// The state in the newest heartbeat or boot-up message; `None` without one.
+    pub state: Option<State>,
+}
+
 /// A bus that can be opened again after it is lost.
 pub struct Network {
     opener: Box<dyn FnMut() -> Result<Box<dyn Bus>, BusError>>,
@@ -42,6 +57,8 @@ pub struct Network {
     /// Time stamp of the newest frame, and the time of its arrival.
     newest: Option<(Instant, Instant)>,
     log: Option<Vec<Logged>>,
+    others: OtherClients,
+    heard: BTreeMap<NodeId, Heard>,
 }
 
 impl Network {
@@ -53,7 +70,16 @@ impl Network {
         mut opener: impl FnMut() -> Result<Box<dyn Bus>, BusError> + 'static,
     ) -> Result<Network, BusError> {
         let bus = opener()?;
-        Ok(Network { opener: Box::new(opener), bus, kept: VecDeque::new(), newest: None, log: None })
+        let (opener, kept) = (Box::new(opener), VecDeque::new());
+        Ok(Network {
+            opener,
+            bus,
+            kept,
+            newest: None,
+            log: None,
+            others: OtherClients::default(),
+            heard: BTreeMap::new(),
+        })
     }
 
     /// Opens the bus again. The kept frames of the old bus are dropped.
@@ -93,6 +119,18 @@ impl Network {
         heartbeats.filter(|heard| heard.node == node).map(|heard| heard.state).next()
     }
 
+    /// What was heard of a node since the bus was opened: heartbeats, emergencies, and PDOs of the pre-defined connection
+    /// set. `None` where nothing was heard.
+    #[must_use]
+    pub fn heard(&self, node: NodeId) -> Option<Heard> {
+        self.heard.get(&node).copied()
+    }
+
+    /// All nodes that were heard.
+    pub fn all_heard(&self) -> impl Iterator<Item = (NodeId, Heard)> {
+        self.heard.iter().map(|(node, heard)| (*node, *heard))
+    }
+
     /// The oldest kept frame.
     pub fn take_kept(&mut self) -> Option<Received> {
         self.kept.pop_front()
@@ -107,6 +145,45 @@ impl Network {
         let now = self.bus.now();
         self.write_down(Logged { frame: *frame, at: now, here: now, is_sent: true });
         Ok(())
+    }
+
+    /// The SDO channel that transfers with a node use.
+    #[must_use]
+    pub fn channel(&self, node: NodeId) -> Channel {
+        self.others.channel(node)
+    }
+
+    /// Sets the SDO channel for transfers with a node, until the node boots; `None` for the default channel.
+    pub fn set_channel(&mut self, node: NodeId, channel: Option<Channel>) {
+        self.others.set_channel(node, channel);
+    }
+
+    /// Waits until no transfer of another client runs on the SDO channel of a node. Returns `false` when one still runs
+    /// at the deadline.
+    ///
+    /// # Errors
+    /// The bus is lost.
+    pub fn wait_for_turn(&mut self, node: NodeId, deadline: Instant) -> Result<bool, BusError> {
+        for _ in 0..AT_ONCE {
+            let Some(received) = self.fetch(self.now())? else { break };
+            self.keep(received);
+        }
+        let pause_until = self.now() + WITHOUT_PAUSE;
+        loop {
+            let now = self.now();
+            let left = self.others.quiet(node, now).map_or(0, |quiet| PAUSE.0.saturating_sub(quiet.0));
+            let is_busy = self.others.is_busy(node, now);
+            if !is_busy && (left == 0 || now >= pause_until) {
+                return Ok(true);
+            }
+            if now >= deadline {
+                return Ok(!is_busy);
+            }
+            let wake = now + Duration(left.max(1000));
+            if let Some(received) = self.fetch(wake.min(deadline))? {
+                self.keep(received);
+            }
+        }
     }
 
     /// Begins a log of all frames, sent and received. A former log is dropped.
@@ -234,11 +311,28 @@ impl Network {
         self.wait(until, |_| None::<()>).map(drop)
     }
 
+    fn hear(&mut self, frame: &Frame) {
+        let id = frame.id();
+        let node = u8::try_from(id & 0x7F).ok().and_then(NodeId::new);
+        let is_sender = matches!(id, 0x081..=0x0FF | 0x181..=0x1FF | 0x281..=0x2FF | 0x381..=0x3FF | 0x481..=0x4FF)
+            || (matches!(id, 0x701..=0x77F) && !frame.is_remote());
+        if let Some(node) = node.filter(|_| is_sender) {
+            let heard = self.heard.entry(node).or_default();
+            heard.state = Heartbeat::parse(frame).map(|heartbeat| heartbeat.state).or(heard.state);
+        }
+    }
+
     fn fetch(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
         let received = self.bus.receive(until)?;
         if let Some(received) = received {
             let here = self.bus.now();
             self.newest = Some((received.at, here));
+            self.hear(&received.frame);
+            self.others.on_frame(&received.frame, here);
+            // After a boot, an additional SDO server may be off again.
+            if let Some(Heartbeat { node, state: State::Initialising }) = Heartbeat::parse(&received.frame) {
+                self.others.set_channel(node, None);
+            }
             self.write_down(Logged { frame: received.frame, at: received.at, here, is_sent: false });
         }
         Ok(received)

@@ -93,24 +93,33 @@ impl Quantity {
         }
     }
 
-    /// The number on the wire for a value that a person has typed. A text with a decimal point is a scaled value; a
-    /// text without one is the number itself.
+    /// The number on the wire for a value that a person has typed, as it is shown: `2` and `2.0` are the same. A
+    /// hexadecimal text is the number itself.
     ///
     /// # Errors
-    /// The text is no value of this type.
+    /// The text is no value of this type, or no multiple of its step.
     pub fn parse(&self, text: &str, data_type: DataType) -> Result<Value, ValueError> {
+        let is_bits = text.trim().trim_start_matches('-').to_ascii_lowercase().starts_with("0x");
+        if self.scale.is_none() || is_bits {
+            return Value::parse(text, data_type);
+        }
         match self.number(text) {
             Some(number) => Value::parse(&number.to_string(), data_type),
-            None => Value::parse(text, data_type),
+            None => Err(ValueError::new(text, format!("a number of steps of {}", self.step()))),
         }
     }
 
-    /// The number for a text with a decimal point, for example `2.5`; `None` for any other text, and where there is no
-    /// scale.
+    /// The smallest step of the value, with its unit.
+    fn step(&self) -> String {
+        format!("{} {}", self.apply(Value::Integer(1)), self.unit)
+    }
+
+    /// The number for a decimal text such as `2` or `2.5`; `None` for any other text, for a value between two steps, and
+    /// where there is no scale.
     #[must_use]
     pub fn number(&self, text: &str) -> Option<i128> {
         let Scale { factor, digits } = self.scale?;
-        let (whole, fraction) = text.trim().split_once('.')?;
+        let (whole, fraction) = text.trim().split_once('.').unwrap_or((text.trim(), ""));
         let missing = usize::from(digits).checked_sub(fraction.len())?;
         let all = format!("{whole}{fraction}{}", "0".repeat(missing));
         let mantissa: i128 = all.parse().ok()?;
@@ -190,12 +199,18 @@ mod tests {
     fn a_number_with_a_point_is_the_value() {
         let quantity = quantity(1, 2);
         for (text, number) in
-            [("2.5", Some(250)), ("-0.05", Some(-5)), ("2.505", None), ("2", None), ("x.1", None)]
+            [("2.5", Some(250)), ("-0.05", Some(-5)), ("2.505", None), ("2", Some(200)), ("x.1", None)]
         {
             assert_eq!(quantity.number(text), number, "{text}");
         }
         assert_eq!(Quantity::plain("ms").number("2.0"), None);
         assert_eq!(Quantity::of_steps(50, "10 um").number("1.5"), Some(3));
         assert_eq!(Quantity::of_steps(50, "10 um").number("1.7"), None);
+        let parse = |text: &str| quantity.parse(text, DataType(0x03));
+        assert_eq!(parse("2"), parse("2.0"));
+        assert_eq!(parse("2"), Ok(Value::Integer(200)));
+        assert_eq!(parse("0x2"), Ok(Value::Integer(2)), "the number on the wire");
+        let error = parse("2.505").unwrap_err().to_string();
+        assert_eq!(error, "\"2.505\" is not a number of steps of 0.01 bar");
     }
 }

@@ -31,6 +31,12 @@ pub fn visible_lines(text: &str) -> String {
     lines.join("\n")
 }
 
+/// Writes a line of our own to the standard error output. A closed output is no error: `eprintln!` would panic.
+pub(crate) fn note(text: impl std::fmt::Display) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 /// Bytes as pairs of hexadecimal digits.
 #[must_use]
 pub fn hex_digits(bytes: &[u8], separator: &str) -> String {

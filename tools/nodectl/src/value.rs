@@ -37,6 +37,12 @@ pub struct ValueError {
     expected: String,
 }
 
+impl ValueError {
+    pub(crate) fn new(text: &str, expected: String) -> ValueError {
+        ValueError { text: text.to_owned(), expected }
+    }
+}
+
 impl Value {
     /// The value in these bytes. Surplus bytes are cut off; too few bytes for the type stay bytes.
     #[must_use]
@@ -53,6 +59,8 @@ impl Value {
     /// Reads a value of a data type.
     ///
     /// Integers are decimal, or hexadecimal after `0x`. Bytes are pairs of hexadecimal digits, with or without spaces.
+    /// Integers of more than 32 bits can also be written as their bytes in the order of the wire, with spaces, because
+    /// profiles use them for structures.
     ///
     /// # Errors
     /// The text is no value of the type, or the value is out of the range of the type.
@@ -60,6 +68,7 @@ impl Value {
         let value = match data_type.class() {
             Class::Signed(bits) => integer(text, -(1 << (bits - 1)), (1 << (bits - 1)) - 1),
             Class::Unsigned(1) => boolean(text),
+            Class::Unsigned(bits @ 33..) => structure(text, bits),
             Class::Unsigned(bits) => integer(text, 0, (1 << bits) - 1),
             Class::Real(32) => text.trim().parse().ok().map(Value::Real32),
             Class::Real(_) => text.trim().parse().ok().map(Value::Real64),
@@ -157,6 +166,18 @@ fn integer(text: &str, low: i128, high: i128) -> Option<Value> {
     (low..=high).contains(&value).then_some(Value::Integer(value))
 }
 
+/// An integer of more than 32 bits: a number, or bytes with spaces. Digits with a leading zero are neither: they look
+/// like bytes, and would be a decimal number.
+fn structure(text: &str, bits: u8) -> Option<Value> {
+    let text = text.trim();
+    if text.contains(' ') {
+        let bytes = hex_bytes(text).filter(|bytes| bytes.len() == usize::from(bits).div_ceil(8))?;
+        return Some(Value::Integer(extend(&bytes, false)));
+    }
+    let is_unclear = text.len() > 1 && text.starts_with('0') && !text.to_ascii_lowercase().starts_with("0x");
+    if is_unclear { None } else { integer(text, 0, (1 << bits) - 1) }
+}
+
 /// Pairs of hexadecimal digits, with or without spaces.
 pub(crate) fn hex_bytes(text: &str) -> Option<Vec<u8>> {
     hex::decode(text.split_ascii_whitespace().collect::<String>()).ok()
@@ -168,6 +189,11 @@ fn expected(data_type: DataType) -> String {
             format!("a whole number from {} to {}", -(1_i128 << (bits - 1)), (1_i128 << (bits - 1)) - 1)
         }
         Class::Unsigned(1) => "true or false".to_owned(),
+        Class::Unsigned(bits @ 33..) => format!(
+            "a whole number from 0 to {}, or {} bytes with spaces between them",
+            (1_i128 << bits) - 1,
+            usize::from(bits).div_ceil(8)
+        ),
         Class::Unsigned(bits) => format!("a whole number from 0 to {}", (1_i128 << bits) - 1),
         Class::Real(_) => "a number".to_owned(),
         Class::Text => "text".to_owned(),

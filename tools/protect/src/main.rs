@@ -20,6 +20,9 @@ struct Cli {
     /// Level 1: no debugger reads or programs the flash. The way back erases all of it. (Level 2 is not offered)
     #[arg(long)]
     readout: bool,
+    /// The chip is held in reset below 2.7 V, which the flash needs at this clock
+    #[arg(long)]
+    brown_out: bool,
     /// Take the chosen protections away
     #[arg(long)]
     off: bool,
@@ -36,6 +39,7 @@ struct Cli {
 impl Cli {
     fn change(&self, has: OptionBytes) -> OptionBytes {
         let wanted = if self.bootloader { has.with_bootloader(!self.off) } else { has };
+        let wanted = if self.brown_out { wanted.with_brown_out(!self.off) } else { wanted };
         if self.readout { wanted.with_read_out(!self.off) } else { wanted }
     }
 
@@ -43,6 +47,7 @@ impl Cli {
     fn pretended(&self) -> OptionBytes {
         let opposite = |chosen| chosen && self.off;
         let new = OptionBytes::FACTORY.with_bootloader(opposite(self.bootloader));
+        let new = new.with_brown_out(opposite(self.brown_out));
         if opposite(self.readout) { new.with_read_out(true) } else { new }
     }
 }
@@ -123,7 +128,16 @@ mod tests {
         assert_eq!(cli("--bootloader --readout").change(new), both);
         assert_eq!(cli("--off --bootloader").change(both), new.with_read_out(true));
         assert_eq!(cli("--off --bootloader --readout").change(both), new);
-        for flags in ["--bootloader", "--readout", "--off --bootloader", "--off --readout"] {
+        assert_eq!(cli("--brown-out").change(new), new.with_brown_out(true));
+        assert_eq!(cli("--off --brown-out").change(new.with_brown_out(true)), new);
+        for flags in [
+            "--brown-out",
+            "--off --brown-out",
+            "--bootloader",
+            "--readout",
+            "--off --bootloader",
+            "--off --readout",
+        ] {
             let cli = cli(flags);
             assert_ne!(cli.change(cli.pretended()), cli.pretended(), "a dry run shows something: {flags}");
         }

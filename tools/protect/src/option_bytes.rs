@@ -12,6 +12,8 @@ const LEVEL_1: u32 = 0x55 << 8;
 const LEVEL_2: u32 = 0xCC << 8;
 /// The nWRP bits of sectors 0 and 1. A sector is protected while its bit is 0.
 const BOOTLOADER: u32 = 0b11 << 16;
+/// BOR_LEV. All bits set: the brown-out reset is off. None set: level 3, below 2.7 V.
+const BROWN_OUT: u32 = 0b11 << 2;
 /// SPRMOD, which changes the meaning of the sector bits.
 const PROPRIETARY: u32 = 1 << 31;
 
@@ -50,6 +52,19 @@ impl OptionBytes {
     #[must_use]
     pub fn keeps_bootloader(self) -> bool {
         self.0 & BOOTLOADER == 0 && !self.is_proprietary()
+    }
+
+    /// Whether the chip is held in reset below 2.7 V (BOR level 3). At 144 MHz with 4 wait states, and for programming
+    /// words, the flash needs this voltage (RM0390, tables 5 and 7).
+    #[must_use]
+    pub fn guards_supply(self) -> bool {
+        self.0 & BROWN_OUT == 0
+    }
+
+    /// The same option bytes with the brown-out reset at level 3 or off.
+    #[must_use]
+    pub fn with_brown_out(self, guards: bool) -> OptionBytes {
+        OptionBytes(if guards { self.0 & !BROWN_OUT } else { self.0 | BROWN_OUT })
     }
 
     /// The level of the read-out protection.
@@ -96,7 +111,16 @@ impl fmt::Display for OptionBytes {
             ReadOut::Protected => "protected (level 1)",
             ReadOut::Final => "protected for ever (level 2)",
         };
-        write!(f, "{:08X}h: bootloader {bootloader}, read-out {read_out}", self.0)
+        let brown_out = match self.0 & BROWN_OUT {
+            0 => "below 2.7 V (level 3)",
+            BROWN_OUT => "off",
+            _ => "below level 3",
+        };
+        write!(
+            f,
+            "{:08X}h: bootloader {bootloader}, read-out {read_out}, brown-out reset {brown_out}",
+            self.0
+        )
     }
 }
 
@@ -113,6 +137,9 @@ mod tests {
         let closed = kept.with_read_out(true);
         assert_eq!((closed.register(), closed.read_out()), (0x0FFC_55EC, ReadOut::Protected));
         assert_eq!(closed.with_read_out(false).with_bootloader(false), new);
+        let guarded = new.with_brown_out(true);
+        assert_eq!((guarded.register(), guarded.guards_supply()), (0x0FFF_AAE0, true));
+        assert_eq!((guarded.with_brown_out(false), new.guards_supply()), (new, false));
         assert!(closed.is_erased_by(kept) && !kept.is_erased_by(closed) && !closed.is_erased_by(closed));
     }
 

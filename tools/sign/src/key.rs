@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use ed25519_dalek::pkcs8::{DecodePrivateKey, EncodePrivateKey, KeypairBytes};
-use ed25519_dalek::{Digest, Sha512, SigningKey};
+use ed25519_dalek::{Digest, Sha512, SigningKey, VerifyingKey};
 use update::key::DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
 
 /// The source of the development key, so that anybody can make it again.
@@ -80,6 +80,16 @@ pub fn write(key: &SigningKey, path: &Path) -> Result<()> {
 #[must_use]
 pub fn variable(key: &SigningKey) -> String {
     format!("UPDATE_PUBLIC_KEY={}", public_digits(key))
+}
+
+/// The public key with these 64 hexadecimal digits.
+///
+/// # Errors
+/// The text is not a public key.
+pub fn public(digits: &str) -> Result<VerifyingKey> {
+    let mut bytes = [0; 32];
+    hex::decode_to_slice(digits.trim(), &mut bytes).context("a public key has 64 hexadecimal digits")?;
+    VerifyingKey::from_bytes(&bytes).context("no public key has these digits")
 }
 
 /// The public half as 64 hexadecimal digits.

@@ -49,9 +49,9 @@ struct ImageArgs {
     /// The secret key, PKCS#8 in PEM [default: the development key, which is known to everybody]
     #[arg(long)]
     key: Option<PathBuf>,
-    /// The product that the image is for, as in 1018h:2
-    #[arg(long, value_parser = number, default_value_t = product::PRODUCT)]
-    product: u32,
+    /// The board that the image is for, as in 2004h:1
+    #[arg(long, value_parser = number, default_value_t = product::BOARD)]
+    board: u32,
     /// The hardware revisions that the image runs on, 0 to 31, with commas
     #[arg(long, value_delimiter = ',', default_value = "0", value_parser = clap::value_parser!(u32).range(0..32))]
     hardware: Vec<u32>,
@@ -112,7 +112,7 @@ fn make_image(args: &ImageArgs) -> Result<()> {
     let revokes = args.revokes.iter().fold(0, |mask, number| mask | 1 << number);
     ensure!(revokes >> args.key_number & 1 == 0, "an image cannot revoke the key that it is signed with");
     let description = Description {
-        product: args.product,
+        board: args.board,
         hardware,
         version: args.version,
         counter: args.counter,
@@ -132,7 +132,7 @@ fn show(image: &Image) {
     let revisions = (0..32).filter(|revision| about.hardware >> revision & 1 != 0);
     let revisions: Vec<_> = revisions.map(|revision: u32| revision.to_string()).collect();
     println!("version     {}", about.version);
-    println!("product     {:#010x}", about.product);
+    println!("board       {:#010x}", about.board);
     println!("hardware    {}", revisions.join(", "));
     println!("counter     {}", about.counter);
     println!("key         number {}", about.key);

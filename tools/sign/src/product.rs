@@ -8,8 +8,8 @@ use crate::code;
 use crate::image::Image;
 use crate::key;
 
-/// The product code that the bootloader accepts (1018h:2). An image contains all personalities.
-pub const PRODUCT: u32 = product::BOARD;
+/// The board code that the bootloader accepts (2004h:1). An image contains all personalities.
+pub const BOARD: u32 = product::BOARD;
 /// The set of hardware revisions, a bit for each: only revision 0 exists.
 pub const HARDWARE: u32 = 1;
 
@@ -30,7 +30,7 @@ pub fn version(text: &str) -> Result<Version> {
 /// The file is no application.
 pub fn image(file: &[u8], key: &SigningKey) -> Result<Image> {
     let version = version(env!("CARGO_PKG_VERSION"))?;
-    let about = Description { product: PRODUCT, hardware: HARDWARE, version, ..Description::default() };
+    let about = Description { board: BOARD, hardware: HARDWARE, version, ..Description::default() };
     Image::sign(about, code::read(file)?, key)
 }
 

@@ -3,7 +3,7 @@
 use bsp::update_layout::LAYOUT;
 use sign::image::Image;
 use sign::{code, key};
-use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_DEVELOPMENT_KEY, PUBLIC_KEYS};
+use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_PUBLISHED_KEY, PUBLIC_KEYS};
 use update::mock::MockFlash;
 use update::{Decision, Description, HEADER_LEN, Next, Start, Status, Target, Updater, Version, boot};
 
@@ -11,11 +11,11 @@ const SECTORS: [usize; 8] = [16, 16, 16, 16, 64, 128, 128, 128];
 
 fn description() -> Description {
     let version = Version { major: 1, minor: 2, patch: 3 };
-    Description { product: 0x8271, hardware: 1, version, counter: 1, ..Description::default() }
+    Description { board: 0x8271, hardware: 1, version, counter: 1, ..Description::default() }
 }
 
 fn target() -> Target {
-    Target { layout: LAYOUT, product: 0x8271, hardware: 0, keys: &PUBLIC_KEYS }
+    Target { layout: LAYOUT, board: 0x8271, hardware: 0, keys: &PUBLIC_KEYS }
 }
 
 /// Updates a node with the flash of the chip. Returns the value of 1F57h at the end.
@@ -64,7 +64,7 @@ fn the_development_key_is_the_one_in_the_file_and_in_the_bootloader() {
     assert_eq!(key.verifying_key().to_bytes(), DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, "{}", key::variable(&key));
     assert!(key::is_development(&key));
     assert!(!key::is_development(&key::random().unwrap()));
-    assert!(HAS_DEVELOPMENT_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 2]);
+    assert!(HAS_PUBLISHED_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 2]);
 }
 
 #[test]

@@ -7,6 +7,7 @@
 
 mod checks;
 mod host;
+mod monitored;
 mod report;
 pub(crate) mod suite;
 
@@ -35,6 +36,9 @@ pub(crate) fn run(flags: &Flags) -> Result<()> {
     let report = Report::new(flags.only.as_deref())?;
     report.run([builds_for_host(), builds_for_target(needs, flags.thorough)], Vec::new())?;
     let tests = suite::collect(flags.thorough, report.only())?;
-    report.run([checks_for_host(), checks_for_target()], tests)?;
+    monitored::begin();
+    let result = report.run([checks_for_host(), checks_for_target()], tests);
+    monitored::print();
+    result?;
     report.finish()
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 
 use super::host::{self, TestProgram};
+use super::monitored;
 use super::report::{Step, last_times};
 use crate::command::{built, root, run};
 use crate::images;
@@ -101,5 +102,6 @@ pub(crate) fn with_images(command: &mut Command, thorough: bool) -> &mut Command
     if thorough {
         command.env("THOROUGH", "1");
     }
+    command.env(monitored::LOG, monitored::log());
     command.env("NODE_IMAGES", images::dir()).env("MECHANICS_IMAGES", images::dir())
 }

@@ -22,17 +22,18 @@ const RECEIVED: [Object; 9] = numbers(0x2001, Access::ReadWrite, Mapping::Rpdo);
 /// Two of the numbers. Transmission type 254.
 const fn rpdo(number: u16) -> [Object; 13] {
     let first = 2 * number as usize - 1;
-    objects::with(objects::rpdo(number, &[RECEIVED[first], RECEIVED[first + 1]]), 2, 254)
+    objects::multiplexed(objects::with(
+        objects::rpdo(number, &[RECEIVED[first], RECEIVED[first + 1]]),
+        2,
+        254,
+    ))
 }
 
 /// The first one is sent with every SYNC.
 const fn tpdo(number: u16) -> [Object; 15] {
     let first = 2 * number as usize - 1;
-    objects::with(
-        objects::tpdo(number, &[SENT[first], SENT[first + 1]]),
-        2,
-        if number == 1 { 1 } else { 254 },
-    )
+    let rows = objects::tpdo(number, &[SENT[first], SENT[first + 1]]);
+    objects::multiplexed(objects::with(rows, 2, if number == 1 { 1 } else { 254 }))
 }
 
 /// Lines of the scanner list and of the dispatching list.

@@ -1,26 +1,21 @@
 //! Bring-up of the whole board in one place: clocks, pins, and the owner of each peripheral.
 
 use stm32f4xx_hal::dma::StreamsTuple;
-use stm32f4xx_hal::pac::{DBGMCU, Peripherals, RCC};
+use stm32f4xx_hal::pac::{FLASH, Peripherals, RCC};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::{Config, Rcc};
 
-use super::ParameterFlash;
 use super::backup::BackupMemory;
 use super::can::Controller;
-use super::clock_tree;
 use super::digital::{Buttons, Lamps};
-use super::encoder;
 use super::flash::Flash;
 use super::front_end::FrontEnd;
 use super::led::Led;
-use super::sampling;
 use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
 use super::watchdog::StartUpWatchdog;
+use super::{ParameterFlash, clock_tree, encoder, errata, idle_pins, retained, sampling};
 use crate::backup_copies::BackupState;
-use crate::bit_timing::APB1_HZ;
 use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
@@ -30,6 +25,10 @@ pub const NAME: &str = "NUCLEO-F446RE";
 /// Name of the board, object 1009h.
 #[cfg(not(feature = "stm32f446"))]
 pub const NAME: &str = "STM32F405/407";
+
+/// Whether the board feeds a clock into OSC_IN, as the ST-LINK of a NUCLEO does; otherwise it has a crystal of 8 MHz.
+/// A property of the board, not of the chip: a board of one's own sets it here. With the wrong value HSE does not start.
+pub(super) const HSE_IS_BYPASSED: bool = cfg!(feature = "stm32f446");
 
 /// All parts of the board that the application uses.
 pub struct Board {
@@ -64,19 +63,19 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts everything but the bus and the sampling. The watchdog comes first, so that a crystal that does not start
-    /// also ends in a reset. Later losses of hardware events are counted in `losses`.
+    /// Starts everything but the bus and the sampling. The watchdog comes first, so that whatever hangs ends in a reset. Later losses of hardware events are counted in `losses`.
     #[must_use]
     pub fn start(device: Peripherals, losses: &'static Losses) -> Board {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
+        errata::keep_debugger(&device.DBGMCU, retained::is_development());
+        clock_tree::raise(&device.RCC, &device.FLASH);
         let reset_cause = reset_cause(&device.RCC);
-        keep_debugger(&device.DBGMCU);
-        let mut rcc = clocks(device.RCC);
+        let mut rcc = device.RCC.constrain();
         let (time, alarms) = time_base::start(device.TIM2, &mut rcc);
         let gpioa = device.GPIOA.split(&mut rcc);
         let gpiob = device.GPIOB.split(&mut rcc);
         let gpioc = device.GPIOC.split(&mut rcc);
-        let (can, transmitter) = Controller::new(device.CAN1, gpiob.pb9, gpiob.pb8, &mut rcc);
+        let (can, transmitter) = Controller::new(device.CAN1, gpiob.pb9, gpiob.pb8, losses, &mut rcc);
         let analogue = sampling::Parts {
             adc: device.ADC1,
             common: device.ADC_COMMON,
@@ -108,6 +107,7 @@ impl Board {
         let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
         let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);
+        idle_pins::make_analogue(&rcc);
         let parameters = ParameterFlash::new(Flash::new(device.FLASH), losses);
         Board {
             reset_cause,
@@ -135,18 +135,15 @@ fn reset_cause(rcc: &RCC) -> ResetCause {
     cause
 }
 
-/// Keeps the debug port clocked while the core sleeps, because RTT is read then.
-pub(super) fn keep_debugger(debug: &DBGMCU) {
-    debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
-}
-
-/// 144 MHz from HSE. APB1 has 36 MHz because the bit rates need it, APB2 72 MHz.
-fn clocks(rcc: RCC) -> Rcc {
-    let config = Config::hse(8.MHz()).sysclk(144.MHz()).pclk1(36.MHz()).pclk2(72.MHz());
-    // The NUCLEO gets its 8 MHz from the ST-LINK; boards with the other chips have a crystal.
-    let config = if cfg!(feature = "stm32f446") { config.bypass_hse_oscillator() } else { config };
-    let rcc = rcc.freeze(config);
-    assert_eq!(rcc.clocks.pclk1().raw(), APB1_HZ);
-    clock_tree::watch(&rcc);
-    rcc
+/// The brown-out level of the option bytes (BOR_LEV; RM0390, 3.6.1): the supply in millivolts below which the chip is
+/// held in reset.
+#[must_use]
+pub fn brown_out_level() -> u16 {
+    // SAFETY: a read of a register that only the loading of the option bytes changes.
+    match unsafe { (*FLASH::ptr()).optcr().read().bor_lev().bits() } {
+        0 => 2700,
+        1 => 2400,
+        2 => 2100,
+        _ => 1700,
+    }
 }

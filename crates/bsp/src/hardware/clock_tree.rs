@@ -1,48 +1,88 @@
-//! The same clocks as in `board`, set register by register, for the bootloader: the HAL computes the dividers at run
-//! time, which takes 2 KiB of flash that the bootloader does not have. Also the clock security system, for both images.
+//! The clock tree of both images, set register by register: the HAL waits for HSE without a bound, and computes the
+//! dividers at run time, which takes 2 KiB of flash. Also the clock security system.
 
-use stm32f4xx_hal::pac::{FLASH, RCC};
+use cortex_m::peripheral::SCB;
+use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 
-/// 144 MHz from HSE: 8 MHz / 4 * 144 / 2. APB1 has a quarter of this clock, APB2 a half.
+use super::board::HSE_IS_BYPASSED;
+use super::{led, retained};
+
+/// 144 MHz from HSE: 8 MHz / 4 * 144 / 2. APB1 has a quarter of this clock, because the bit rates need it, APB2 a half.
 const DIVIDER_M: u8 = 4;
 const MULTIPLIER_N: u16 = 144;
 /// 4 wait states from 120 MHz on at 2.7 V and more (RM0390, table 6), caches and prefetch on.
 const WAIT_STATES: u8 = 4;
+/// Number of polls of HSERDY in one try: about a second with HSI. The watchdog allows two at least.
+const CLOCK_POLLS: u32 = 1 << 20;
+/// Number of polls between two changes of the LED: about 60 ms.
+const LED_POLLS: u32 = 1 << 16;
+/// AHB cycles until a new divider of a bus is in force (RM0390, 6.3.3, PPRE1).
+const PRESCALER_CYCLES: u32 = 16;
 
 /// Raises the clocks from their reset state.
 pub(super) fn raise(rcc: &RCC, flash: &FLASH) {
-    let is_bypassed = cfg!(feature = "stm32f446");
-    rcc.cr().modify(|_, w| w.hsebyp().bit(is_bypassed).hseon().set_bit());
-    while rcc.cr().read().hserdy().bit_is_clear() {}
+    start_hse(rcc);
     // SAFETY: M and N are within their ranges (RM0390, 6.3.2); P = 2 is the reset value.
     rcc.pllcfgr().modify(|_, w| unsafe { w.pllsrc().hse().pllm().bits(DIVIDER_M).plln().bits(MULTIPLIER_N) });
     rcc.cr().modify(|_, w| w.pllon().set_bit());
     // SAFETY: LATENCY takes any number.
     flash.acr().write(|w| unsafe {
-        w.latency().bits(WAIT_STATES).prften().set_bit().icen().set_bit().dcen().set_bit()
+        w.latency().bits(WAIT_STATES).prften().bit(can_prefetch()).icen().set_bit().dcen().set_bit()
     });
     while rcc.cr().read().pllrdy().bit_is_clear() {}
     rcc.cfgr().modify(|_, w| w.ppre1().div4().ppre2().div2());
+    cortex_m::asm::delay(PRESCALER_CYCLES);
     rcc.cfgr().modify(|_, w| w.sw().pll());
     while !rcc.cfgr().read().sws().is_pll() {}
     watch(rcc);
 }
 
+/// Switches HSE on. The clock of an ST-LINK may come seconds after the supply of the board, so the wait has a bound: the
+/// LED flickers, the try is counted, and the chip is reset for the next one. Without a watchdog reset, the cause of the
+/// start is still the supply.
+fn start_hse(rcc: &RCC) {
+    rcc.cr().modify(|_, w| w.hsebyp().bit(HSE_IS_BYPASSED).hseon().set_bit());
+    for polls in 1..=CLOCK_POLLS {
+        if rcc.cr().read().hserdy().bit_is_set() {
+            return;
+        }
+        if polls % LED_POLLS == 0 {
+            led::flicker(rcc);
+        }
+    }
+    retained::set_clock_tries(retained::clock_tries().saturating_add(1));
+    SCB::sys_reset()
+}
+
+/// Revision A of STM32F405 and F407 must not prefetch (ES0182: ART accelerator prefetch queue instruction is not
+/// supported). The STM32F446 can.
+fn can_prefetch() -> bool {
+    const REVISION_A: u16 = 0x1000;
+    // SAFETY: a read of a constant.
+    cfg!(feature = "stm32f446") || unsafe { (*DBGMCU::ptr()).idcode().read().rev_id().bits() } != REVISION_A
+}
+
 /// Switches the clock security system on: if HSE fails, the core continues with HSI and NMI is raised (RM0390, 6.2.7).
-pub(super) fn watch(rcc: &RCC) {
+fn watch(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
-/// Restores the reset state of the clocks, which the application expects (RM0390, 6.3.1 to 6.3.3).
+/// Restores the reset state of the clocks, which the application expects (RM0390, 6.3.1 to 6.3.3). The dividers follow
+/// the switch to HSI: before it, APB1 would run at 144 MHz.
 pub(super) fn lower(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.csson().clear_bit());
-    rcc.cfgr().reset();
+    rcc.cfgr().modify(|_, w| w.sw().hsi());
     while !rcc.cfgr().read().sws().is_hsi() {}
+    rcc.cfgr().reset();
     rcc.cr().modify(|_, w| w.pllon().clear_bit().hseon().clear_bit());
     while rcc.cr().read().pllrdy().bit_is_set() {}
     rcc.cr().modify(|_, w| w.hsebyp().clear_bit());
     rcc.pllcfgr().reset();
     // SAFETY: the flash driver has done its work. Without an operation under way nobody depends on the wait states and
     // the caches, and the reset value of ACR suits the present 16 MHz.
-    unsafe { (*FLASH::ptr()).acr().reset() };
+    let acr = unsafe { (*FLASH::ptr()).acr() };
+    acr.reset();
+    // The caches are off, so they can be emptied: the application may be another one than before (RM0390, 3.4.2).
+    acr.write(|w| w.icrst().set_bit().dcrst().set_bit());
+    acr.reset();
 }

@@ -10,7 +10,8 @@ use super::flash::Flash;
 use super::led::Led;
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
-use super::{ProgramFlash, StartUpWatchdog, board, clock_tree, confinement, crash};
+use super::{ProgramFlash, StartUpWatchdog, clock_tree, confinement, crash, errata};
+use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
 /// Clock, watchdog and flash.
@@ -48,14 +49,14 @@ pub struct Bus {
 }
 
 impl Loader {
-    /// The watchdog comes first, so that a crystal that does not start also ends in a reset. Next, all memory but the
+    /// The watchdog comes first, so that whatever hangs ends in a reset. Next, all memory but the
     /// code of the bootloader is made non-executable, before anything is examined. The clock is raised because the CRC
     /// of the application takes nine times as long at the 16 MHz of a reset.
     #[must_use]
-    pub fn start(device: Peripherals) -> Loader {
+    pub fn start(device: Peripherals, is_for_development: bool) -> Loader {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
         confinement::begin();
-        board::keep_debugger(&device.DBGMCU);
+        errata::keep_debugger(&device.DBGMCU, is_for_development);
         let reset = reset(&device.RCC);
         clock_tree::raise(&device.RCC, &device.FLASH);
         let rcc = device.RCC.constrain();
@@ -68,11 +69,11 @@ impl Loader {
 impl Rest {
     /// The bootloader stays: starts time base, CAN controller and LED, and clears the cause of the reset.
     #[must_use]
-    pub fn start(mut self) -> Bus {
+    pub fn start(mut self, losses: &'static Losses) -> Bus {
         self.rcc.csr().modify(|_, w| w.rmvf().set_bit());
         let (time, [alarm, _]) = time_base::start(self.timer, &mut self.rcc);
         let (gpioa, gpiob) = (self.ports.0.split(&mut self.rcc), self.ports.1.split(&mut self.rcc));
-        let (can, transmitter) = Controller::new(self.can, gpiob.pb9, gpiob.pb8, &mut self.rcc);
+        let (can, transmitter) = Controller::new(self.can, gpiob.pb9, gpiob.pb8, losses, &mut self.rcc);
         Bus { time, alarm, can, transmitter, led: Led::new(gpioa.pa5) }
     }
 

@@ -17,6 +17,10 @@ struct Retained {
     bootloader: AtomicU32,
     /// A mark that says whether the rest is valid, then challenge and response.
     authorisation: [AtomicU32; 5],
+    /// The erase budget of the parameter memory, and its complement.
+    erase_budget: [AtomicU32; 2],
+    /// Tries of the clock, and their complement.
+    clock_tries: AtomicU32,
 }
 
 /// `used` keeps the compiler from assuming the initial values, which a reset does not write.
@@ -29,6 +33,8 @@ static RETAINED: Retained = Retained {
     proven: [const { AtomicU32::new(0) }; 2],
     bootloader: AtomicU32::new(0),
     authorisation: [const { AtomicU32::new(0) }; 5],
+    erase_budget: [const { AtomicU32::new(0) }; 2],
+    clock_tries: AtomicU32::new(0),
 };
 
 /// The mark of a development bootloader: 'DEVL'.
@@ -111,6 +117,31 @@ pub fn set_authorisation(pair: &Pair) {
 pub fn forget_authorisation() {
     let [mark, ..] = &RETAINED.authorisation;
     mark.store(0, Ordering::Relaxed);
+}
+
+/// What the run before has left of the erase budget; `None` after a loss of power.
+#[must_use]
+pub fn erase_budget() -> Option<u16> {
+    let [budget, complement] = load(&RETAINED.erase_budget);
+    if complement == !budget { u16::try_from(budget).ok() } else { None }
+}
+
+/// Keeps the erase budget for the next start.
+pub fn set_erase_budget(budget: u16) {
+    store(&RETAINED.erase_budget, [budget.into(), !u32::from(budget)]);
+}
+
+/// Number of resets since power-on because there was no clock on OSC_IN.
+#[must_use]
+pub fn clock_tries() -> u16 {
+    let word = RETAINED.clock_tries.load(Ordering::Relaxed);
+    let [tries, complement] = [word as u16, (word >> 16) as u16];
+    if complement == !tries { tries } else { 0 }
+}
+
+/// Keeps the number for the next start.
+pub fn set_clock_tries(tries: u16) {
+    RETAINED.clock_tries.store(u32::from(!tries) << 16 | u32::from(tries), Ordering::Relaxed);
 }
 
 /// The words of the crash record.

@@ -23,7 +23,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 use stm32f4xx_hal::ClearFlags;
 use stm32f4xx_hal::dma::traits::{Stream, StreamISR};
 use stm32f4xx_hal::dma::{DmaChannel, DmaDataSize, DmaDirection, Stream3, Stream4};
-use stm32f4xx_hal::gpio::{Alternate, PB13, PB14};
+use stm32f4xx_hal::gpio::{Alternate, PB13, PB14, Speed};
 use stm32f4xx_hal::pac::{DMA1, SPI2};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
@@ -37,6 +37,11 @@ const DIVIDER: u8 = 5;
 const CLOCK_HZ: u32 = APB1_HZ >> (DIVIDER + 1);
 /// Longest time in microseconds for which encoders on the market need the clock to rest before the next word.
 const MONOFLOP: u32 = 100;
+
+/// Speed of the clock pin. The SPI samples by the clock that it reads back from the pin. At low speed this clock may be
+/// too late for the last bit of a byte, which then has the value of that bit in the byte before (ES0298, 2.14, and
+/// ES0182, 2.12.4: corrupted last bit of data received in master mode with delayed SCK feedback; stm32f4xx-hal 564).
+const CLOCK_SPEED: Speed = Speed::VeryHigh;
 
 const _: () = {
     assert!(CLOCK_HZ <= 1_000_000, "encoders stand 1 MHz");
@@ -73,7 +78,7 @@ impl Ssi {
         let Parts { spi, receive, send, clock, data } = parts;
         SPI2::enable(rcc);
         SPI2::reset(rcc);
-        let pins = (clock.into_alternate(), data.into_alternate());
+        let pins = (clock.into_alternate().speed(CLOCK_SPEED), data.into_alternate());
         let mut ssi = Ssi { spi, receive, send, started: 0, losses, _pins: pins };
         ssi.set_up();
         ssi

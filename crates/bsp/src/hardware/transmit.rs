@@ -20,8 +20,9 @@ const TXRQ: u32 = 1 << 0;
 const TXOK: u32 = 1 << 1;
 const ABRQ: u32 = 1 << 7;
 
-/// Number of polls for an abort: it takes a few clocks, unless the transmission has just begun.
-const ABORT_POLLS: u32 = 100;
+/// Number of polls for an abort: it takes a few clocks of APB1, unless the transmission has just begun. A poll takes
+/// three of these clocks at least. More polls would only make the task longer: it does not need the result at once.
+const ABORT_POLLS: u32 = 16;
 
 /// The transmit mailboxes.
 pub struct Transmitter {
@@ -36,24 +37,6 @@ impl Transmitter {
         Transmitter { aborted: None }
     }
 
-    /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
-    /// raises the interrupt again.
-    pub fn acknowledge(&mut self) {
-        self.settle();
-        registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
-    }
-
-    /// Checks whether the transmission of the aborted frame has ended. A frame that was not sent goes back into its
-    /// mailbox.
-    fn settle(&mut self) {
-        if let Some((number, frame)) = self.aborted.filter(|(number, _)| !is_aborting(*number)) {
-            self.aborted = None;
-            if let Some(mailbox) = registers().tx_iter().nth(number as usize).filter(|_| !is_sent(number)) {
-                load(mailbox, &frame);
-            }
-        }
-    }
-
     /// Puts a frame into the first mailbox, if that is free. For a caller that uses no other mailbox, so that frames
     /// keep their order.
     pub fn put(&mut self, frame: &Frame) -> bool {
@@ -66,12 +49,12 @@ impl Transmitter {
 }
 
 impl Mailboxes for Transmitter {
-    /// Among equal identifiers the hardware sends the lowest mailbox number first, not the oldest frame. A frame is
-    /// therefore accepted only if it is more urgent than all pending ones.
+    /// The hardware sends the most urgent of the pending frames. Among equal identifiers it sends the lowest mailbox
+    /// number first, not the oldest frame, so only one frame of an identifier is pending at a time.
     fn offer(&mut self, frame: &Frame) -> Offer {
         if self.aborted.is_some()
             || would_wait()
-            || pending().any(|(_, other)| order(other) <= identifier(frame))
+            || pending().any(|(_, other)| order(other) == identifier(frame))
         {
             return Offer::Refused;
         }
@@ -79,7 +62,8 @@ impl Mailboxes for Transmitter {
             load(free, frame);
             return Offer::Taken;
         }
-        let Some((number, last)) = pending().max_by_key(|(_, mailbox)| order(mailbox)) else {
+        let least = pending().max_by_key(|(_, mailbox)| order(mailbox));
+        let Some((number, last)) = least.filter(|(_, last)| order(last) > identifier(frame)) else {
             return Offer::Refused;
         };
         let replaced = content(last);
@@ -96,6 +80,23 @@ impl Mailboxes for Transmitter {
     fn is_idle(&self) -> bool {
         let status = registers().tsr().read();
         status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
+    }
+
+    /// Checks whether the transmission of the aborted frame has ended. A frame that was not sent goes back into its
+    /// mailbox, unless it belongs to the time before a restart of the bus. Acknowledges the transmit interrupt after the
+    /// check, which reads the flags, and before the mailboxes are filled: a mailbox that becomes free later raises the
+    /// interrupt again.
+    fn settle(&mut self, is_cleared: bool) {
+        if is_cleared {
+            self.aborted = None;
+        }
+        if let Some((number, frame)) = self.aborted.filter(|(number, _)| !is_aborting(*number)) {
+            self.aborted = None;
+            if let Some(mailbox) = registers().tx_iter().nth(number as usize).filter(|_| !is_sent(number)) {
+                load(mailbox, &frame);
+            }
+        }
+        registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
     }
 }
 

@@ -14,8 +14,17 @@ const TIMEOUT_MS: u32 = 200;
 /// 16 KiB during the start-up, which takes up to 0.8 s each.
 const START_UP_MS: u32 = 3_000;
 
-/// The value of KR that restarts the countdown.
+/// Nominal time-out in milliseconds while a flash page is erased, in reality 690 ms to 1.9 s: the erase takes up to 0.5 s.
+/// The longest with the prescaler of the running node.
+const PAUSE_MS: u32 = 1_023;
+
+/// Values of KR: restarts the countdown, unlocks the other registers (RM0390, 20.4.1).
 const RELOAD: u16 = 0xAAAA;
+const UNLOCK: u16 = 0x5555;
+/// Ticks of the countdown in a millisecond: 32 kHz nominal, divided by 8.
+const TICKS: u32 = 4;
+/// Number of reads of SR for five cycles of the oscillator, after which a new value is in force (RM0390, 20.4.3).
+const UPDATE_POLLS: u32 = 1 << 14;
 
 /// The watchdog while the node starts, with the long time-out.
 pub struct StartUpWatchdog(IndependentWatchdog);
@@ -55,4 +64,30 @@ impl Watchdog {
             unsafe { (*IWDG::ptr()).kr().write(|w| w.key().bits(RELOAD)) };
         }
     }
+
+    /// Does something that stops all parts for up to 0.5 s: the erase of a flash page.
+    pub fn extend<R>(&self, pause: impl FnOnce() -> R) -> R {
+        set_time_out(PAUSE_MS);
+        let result = pause();
+        set_time_out(TIMEOUT_MS);
+        result
+    }
+}
+
+/// Changes the time-out of the running node, and restarts the countdown.
+fn set_time_out(milliseconds: u32) {
+    let value = u16::try_from(milliseconds * TICKS).unwrap_or(u16::MAX);
+    // SAFETY: the peripheral was given to `StartUpWatchdog`. Only the task of the lowest priority comes here; the others
+    // write nothing but KR, and not between the two writes below.
+    let watchdog = unsafe { &*IWDG::ptr() };
+    let is_updated = || (0..UPDATE_POLLS).any(|_| watchdog.sr().read().rvu().bit_is_clear());
+    is_updated();
+    cortex_m::interrupt::free(|_| {
+        // SAFETY: this is the key.
+        watchdog.kr().write(|w| unsafe { w.key().bits(UNLOCK) });
+        watchdog.rlr().write(|w| w.rl().set(value));
+    });
+    is_updated();
+    // SAFETY: this is the key.
+    watchdog.kr().write(|w| unsafe { w.key().bits(RELOAD) });
 }

@@ -25,6 +25,7 @@ impl Heartbeat {
 
 /// A change in the state of a supervised node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Event {
     /// The node has booted up.
     BootUp(NodeId),

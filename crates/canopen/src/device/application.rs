@@ -72,10 +72,20 @@ pub trait Application {
         false
     }
 
-    /// The groups to store when an SDO client writes this entry, as a write to 1010h would. The SDO response is sent
-    /// when the groups are stored.
+    /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response
+    /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, the write is
+    /// refused and has no effect.
     fn stores(&self, _entry: &Entry) -> Option<Groups> {
         None
+    }
+
+    /// Whether a job can be stored now. Asked before the effect of every request that stores values. A job that runs
+    /// does not count: the answer must hold for one job more.
+    ///
+    /// # Errors
+    /// The reason to refuse the request, for example [`Abort::DeviceState`] while the memory has no room.
+    fn can_store(&self) -> Result<(), Abort> {
+        Ok(())
     }
 
     /// From now on, a TPDO with [`sends_events`](Application::sends_events) can be sent: the device has become
@@ -113,12 +123,14 @@ pub trait Application {
     /// are discarded, and the group has its defaults.
     fn loaded(&mut self, _group: Group, _good: bool) {}
 
-    /// A client wants to stop or to reset the program (1F51h, CiA 302-3). The device then stops its present operation.
+    /// Whether an SDO client may write this entry now, for example stop the program (1F51h, CiA 302-3). Called before
+    /// type and limits are checked. A domain that arrives in several parts asks
+    /// [`write_domain`](Application::write_domain) only.
     ///
     /// # Errors
-    /// The reason to refuse the command. An application that has to identify the client first returns
+    /// The reason to refuse the write; nothing changes then. An application that has to identify the client first returns
     /// [`Abort::DeviceState`] until then.
-    fn stop_program(&mut self) -> Result<(), Abort> {
+    fn admits(&self, _entry: &Entry) -> Result<(), Abort> {
         Ok(())
     }
 

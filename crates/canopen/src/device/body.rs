@@ -1,12 +1,12 @@
 //! The interface between the services and the device behind them: the inner device, or the outer device around it.
 
 use super::basic::Basic;
-use super::{Application, STALE};
+use super::{Application, Job, STALE};
 use crate::dictionary::{Dictionary, Entry};
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::transmit::Context;
+use crate::transmit::{Context, ProcessContext};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// A device without its services. The default of every method is the behaviour of the inner device; the outer device
@@ -57,10 +57,10 @@ pub trait Body: Sized {
     fn configure(&mut self, _now: Instant) {}
 
     /// Takes a frame that is neither NMT nor for the services. Called in states with PDOs only.
-    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut Context<'_, impl Transmit>) {}
+    fn on_pdo_frame(&mut self, _frame: &Frame, _turn: &mut ProcessContext<'_, impl Transmit>) {}
 
     /// Sends the process data that is due.
-    fn send_process(&mut self, _turn: &mut Context<'_, impl Transmit>) {
+    fn send_process(&mut self, _turn: &mut ProcessContext<'_, impl Transmit>) {
         self.basic_mut().process_due = Instant::NEVER;
     }
 
@@ -88,8 +88,14 @@ pub trait Body: Sized {
     /// Applies the new value of an entry with a rule.
     fn value_written(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
 
-    /// An SDO client has written the entry: stores the groups that the application wants stored at once.
-    fn store_at_once(&mut self, _entry: &Entry) -> Result<(), Abort> {
+    /// The job that a write to the entry by an SDO client begins, if the application wants groups stored at once. An
+    /// error refuses the write before it has an effect.
+    fn check_store(&self, _entry: &Entry) -> Result<Option<Job>, Abort> {
+        Ok(None)
+    }
+
+    /// Begins the job of `check_store`, after the write. The response to the client waits for its end.
+    fn store_at_once(&mut self, _job: Job) -> Result<(), Abort> {
         Ok(())
     }
 

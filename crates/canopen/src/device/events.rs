@@ -3,11 +3,18 @@
 use super::full::Full;
 use super::{Application, STALE};
 use crate::pdo::Chain;
-use crate::transmit::Context;
+use crate::transmit::ProcessContext;
 use crate::{Instant, Transmit};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// The TPDO at this place can be sent from now on.
     pub(super) fn begin_events(&mut self, place: usize) {
@@ -20,7 +27,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Sends the waiting events of the application as far as they may be sent. Returns when to call again.
     #[inline]
-    pub(super) fn send_events(&mut self, context: &mut Context<'_, impl Transmit>) -> Instant {
+    pub(super) fn send_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Instant {
         if self.sends_events && self.basic.state.has_pdos() {
             self.ask_for_events(context)
         } else {
@@ -29,7 +36,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     #[inline(never)]
-    fn ask_for_events(&mut self, context: &mut Context<'_, impl Transmit>) -> Instant {
+    fn ask_for_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Instant {
         let mut due = Instant::NEVER;
         for place in 0..self.tpdos.len() {
             while self.send_event(place, context) {}
@@ -39,7 +46,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Sends one event of the TPDO, if the application has any. Returns whether an event was sent.
-    fn send_event(&mut self, place: usize, context: &mut Context<'_, impl Transmit>) -> bool {
+    fn send_event(&mut self, place: usize, context: &mut ProcessContext<'_, impl Transmit>) -> bool {
         let Some(tpdo) = self.tpdos.get_mut(place) else { return false };
         let Some(number) = tpdo.asks_for_event(context) else { return false };
         let is_event = self.basic.application.next_event(number, &mut self.basic.image);
@@ -48,7 +55,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Sends one event of each TPDO that the SYNC triggers.
-    pub(super) fn send_events_with_sync(&mut self, context: &mut Context<'_, impl Transmit>) {
+    pub(super) fn send_events_with_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Valid)) {
             links = tpdo.links;

@@ -4,6 +4,7 @@ use super::body::Body;
 use super::full::Full;
 use super::{Application, Device, ErrorClass, Next, STALE};
 use crate::Instant;
+use crate::dictionary::Services;
 use crate::emcy::Fault;
 use crate::nmt::State;
 
@@ -16,6 +17,7 @@ const TO_STOPPED: u32 = 2;
 /// An event that the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum BusEvent {
     /// A received frame was lost.
     Overrun,
@@ -29,8 +31,15 @@ pub enum BusEvent {
     Recovered,
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Device<A, N, T, R, W, M, S>
 {
     /// Takes an event of the CAN controller: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
     /// communication error. A warning has no emergency code, because the node still works; a worse state is reported as
@@ -57,27 +66,61 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.process_next()
     }
 
-    /// Reacts to an error of the application as object 1029h says.
+    /// Reacts to an error as object 1029h says. A [`Condition`](crate::Condition) with a class needs no such call: its
+    /// fault is the error.
     pub fn error(&mut self, class: ErrorClass) -> Next {
-        self.body.apply_error(class);
-        self.silence_services();
+        self.body.emcy.add_error(class);
+        self.body.react();
+        self.body.basic.services_due = STALE;
         self.process_next()
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
-    pub(super) fn apply_error(&mut self, class: ErrorClass) {
-        self.basic.application.error(class, &mut self.basic.image);
-        let ErrorClass(sub) = class;
-        match self.basic().number(ERROR_BEHAVIOUR, sub) {
-            TO_PRE_OPERATIONAL if self.basic.state == State::Operational => {
+    /// Applies object 1029h to the errors since the last call.
+    ///
+    /// Stopped has no EMCY. A node that has to stop is therefore Pre-operational until its EMCYs are sent; after
+    /// bus-off, that is after the recovery.
+    pub(super) fn react(&mut self) {
+        while let Some(class) = self.emcy.take_error() {
+            self.basic.application.error(class, &mut self.basic.image);
+            let ErrorClass(sub) = class;
+            let behaviour = self.basic().number(ERROR_BEHAVIOUR, sub);
+            if self.basic.state == State::Operational && matches!(behaviour, TO_PRE_OPERATIONAL | TO_STOPPED)
+            {
                 self.enter(State::PreOperational);
             }
-            TO_STOPPED if self.basic.state.has_services() => self.enter(State::Stopped),
-            _ => (),
+            if self.basic.state.has_services() && behaviour == TO_STOPPED {
+                self.basic.pending.next_state = Some(State::Stopped);
+            }
         }
+        let has_to_stop = self.basic.pending.next_state == Some(State::Stopped);
+        if has_to_stop && (!Self::has(Services::EMCY) || self.emcy.is_idle()) && !self.is_bus_off {
+            self.basic.pending.next_state = None;
+            self.enter(State::Stopped);
+        }
+    }
+
+    /// EMCY has been switched on: reports the active faults. Messages that have waited are older.
+    pub(super) fn report_active(&mut self, now: Instant) {
+        self.emcy.forget_waiting();
+        self.emcy.repeat_singles(now);
+        for number in self.watches.lost() {
+            let _ = self.emcy.repeat(Fault::Heartbeat(number), now);
+        }
+        for fault in self.rpdos.iter().flat_map(crate::pdo::Rpdo::active) {
+            let _ = self.emcy.repeat(fault, now);
+        }
+        self.basic.services_due = STALE;
     }
 
     /// Reports bus-off after the recovery: during bus-off, the node cannot send.
@@ -99,14 +142,24 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     // Not inlined: many callers, none of them time-critical.
     #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
-        if self.emcy.raise(fault, now) {
+        let is_new = if Self::has(Services::EMCY) {
+            self.emcy.raise(fault, now)
+        } else {
+            self.emcy.raise_silently(fault)
+        };
+        if is_new {
             self.fault_changed(fault, true);
         }
     }
 
     #[inline(never)]
     pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
-        if self.emcy.clear(fault, now) {
+        let was_active = if Self::has(Services::EMCY) {
+            self.emcy.clear(fault, now)
+        } else {
+            self.emcy.clear_silently(fault)
+        };
+        if was_active {
             self.fault_changed(fault, false);
         }
     }

@@ -4,18 +4,26 @@ use super::basic::Basic;
 use super::body::Body;
 use super::pdos::low_half;
 use super::state::SELF_START;
-use super::{Application, ErrorClass, Job, STALE, store};
-use crate::dictionary::{Dictionary, Entry, Group, Groups, Rule};
+use super::{Application, Job, STALE, store};
+use crate::dictionary::{Dictionary, Entry, Group, Groups, Rule, Services};
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
 use crate::sdo::Abort;
-use crate::transmit::Context;
+use crate::transmit::{Context, ProcessContext};
 use crate::{CanId, Frame, Instant, NodeId, Transmit, emcy, heartbeat, sync};
 
 /// A complete device without its services. The parameters are those of [`Device`](super::Device).
 #[derive(Debug)]
-pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> {
+pub struct Full<
+    A,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> {
     pub(super) basic: Basic<A, [u8; N]>,
     pub(super) watches: heartbeat::Consumer<W>,
     pub(super) sync: sync::Consumer,
@@ -41,8 +49,15 @@ pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usiz
     pub(super) is_bus_off: bool,
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> Body
-    for Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Body for Full<A, N, T, R, W, M, S>
 {
     type Application = A;
     type Image = [u8; N];
@@ -88,15 +103,19 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.sync.stop();
         for place in 0..T {
             if let Some(tpdo) = self.tpdos.get_mut(place) {
+                if state == State::Initialising {
+                    tpdo.forget_sent();
+                }
                 if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
             }
             self.begin_events(place);
         }
         self.rpdos.iter_mut().for_each(Rpdo::stop);
-        if state.has_pdos() {
-            self.scanner.start();
-        } else {
-            self.scanner.stop();
+        if M > 0 {
+            if state == State::Initialising {
+                self.scanner.forget_sent();
+            }
+            if state.has_pdos() { self.scanner.start() } else { self.scanner.stop() }
         }
         self.basic.process_due = STALE;
     }
@@ -106,46 +125,60 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn configure(&mut self, now: Instant) {
-        self.configure_sync(now);
-        self.emcy.configure(self.basic().number_or(0x1014, 0, emcy::OFF));
-        self.emcy.set_inhibit(low_half(self.basic().number(0x1015, 0)));
+        if Self::has(Services::SYNC) {
+            self.configure_sync(now);
+        }
+        if Self::has(Services::EMCY) {
+            let _ = self.emcy.configure(self.basic().number_or(0x1014, 0, emcy::OFF));
+            self.emcy.set_inhibit(low_half(self.basic().number(0x1015, 0)), now);
+        }
         self.configure_watches(now);
         self.configure_pdos(now);
-        self.emcy.restart(now);
+        if Self::has(Services::EMCY) {
+            self.emcy.restart(now);
+        } else {
+            self.emcy.restart_silently();
+        }
         self.report_stored(now);
         self.update_error_register();
         if self.basic().number(0x1F80, 0) == SELF_START {
-            self.basic.pending.self_start_state = Some(State::Operational);
+            self.basic.pending.next_state = Some(State::Operational);
         }
     }
 
-    fn on_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+    fn on_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         self.take_pdo_frame(frame, context);
     }
 
-    fn send_process(&mut self, context: &mut Context<'_, impl Transmit>) {
+    fn send_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
         if context.now >= self.basic.process_due {
             self.run_process(context);
         }
     }
 
     fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
-        self.take_heartbeat(frame, now);
+        if W > 0 {
+            self.take_heartbeat(frame, now);
+        }
     }
 
+    #[inline(never)]
     fn poll_errors(&mut self, context: &mut Context<'_, impl Transmit>) {
-        while let Some(change) = self.watches.expire(context.now) {
+        while W > 0
+            && let Some(change) = self.watches.expire(context.now)
+        {
             self.on_watch(change, context.now);
-            self.apply_error(ErrorClass::COMMUNICATION);
         }
-        if self.basic.state.has_services() {
+        if Self::has(Services::EMCY) && self.basic.state.has_services() {
             self.emcy.poll(context);
         }
+        self.react();
     }
 
     fn errors_due(&self) -> Instant {
-        let emcy = if self.basic.state.has_services() { self.emcy.due() } else { Instant::NEVER };
-        emcy.min(self.watches.due())
+        let is_sent = Self::has(Services::EMCY) && self.basic.state.has_services();
+        let emcy = if is_sent { self.emcy.due() } else { Instant::NEVER };
+        if W > 0 { emcy.min(self.watches.due()) } else { emcy }
     }
 
     fn computed(&self, entry: &Entry) -> Result<&[u8], Abort> {
@@ -164,11 +197,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.apply_value(entry, value, now);
     }
 
-    fn store_at_once(&mut self, entry: &Entry) -> Result<(), Abort> {
-        match self.basic.application.stores(entry) {
-            Some(groups) => self.begin_deferred(Job::Store(groups)),
-            None => Ok(()),
-        }
+    fn check_store(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
+        self.check_store_at_once(entry)
+    }
+
+    fn store_at_once(&mut self, job: Job) -> Result<(), Abort> {
+        self.begin_deferred(job)
     }
 
     fn store_configuration(&mut self, configuration: Configuration) -> bool {
@@ -184,9 +218,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
+    /// Whether the rows ask for a service. The compiler removes the code of any other.
+    pub(super) const fn has(service: Services) -> bool {
+        Services::from_bits(S).contains(service)
+    }
+
     fn load_parameters(&mut self, everything: bool) {
         let scope =
             if everything { super::state::Scope::Everything } else { super::state::Scope::Communication };

@@ -77,7 +77,7 @@ impl LssSlave {
             }
             Outcome::Switch(switch) => {
                 self.switching = Switching::Before(switch);
-                self.switching_due = context.now + switch.delay();
+                self.switching_due = context.now.plus(switch.delay());
                 None
             }
             // The response is sent at the end of the job.
@@ -99,7 +99,7 @@ impl LssSlave {
     #[inline(never)]
     fn send(&mut self, context: &mut Context<'_, impl Transmit>) {
         let is_sent = context.send(Frame::data_frame(RESPONSE, 8, self.reply));
-        self.reply_due = if is_sent { Instant::NEVER } else { context.now + RETRY };
+        self.reply_due = if is_sent { Instant::NEVER } else { context.now.plus(RETRY) };
     }
 
     /// Sends the response again that found the queue full.
@@ -110,17 +110,18 @@ impl LssSlave {
     }
 
     /// Continues a change of the bit rate. Frames that were held back are sent after the change.
-    pub(super) fn poll_switching(&mut self, now: Instant, body: &mut impl Body) {
+    /// Returns the new bit rate when the bus changes to it.
+    pub(super) fn poll_switching(&mut self, now: Instant, body: &mut impl Body) -> Option<BitRate> {
         if now < self.switching_due {
-            return;
+            return None;
         }
-        (self.switching, self.switching_due) = match self.switching {
-            Switching::Before(switch) => {
-                body.basic_mut().ask(Action::BitRate(switch.bit_rate));
-                (Switching::After, now + switch.delay())
-            }
-            Switching::No | Switching::After => (Switching::No, Instant::NEVER),
+        let Switching::Before(switch) = self.switching else {
+            (self.switching, self.switching_due) = (Switching::No, Instant::NEVER);
+            return None;
         };
+        body.basic_mut().ask(Action::BitRate(switch.bit_rate));
+        (self.switching, self.switching_due) = (Switching::After, now.plus(switch.delay()));
+        Some(switch.bit_rate)
     }
 
     /// The next deadline of `poll` or `poll_switching`.

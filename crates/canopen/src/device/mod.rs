@@ -53,12 +53,20 @@ use full::Full;
 use services::Services;
 
 /// A device with an application `A`, and room for its dictionary: an image of `N` bytes, `T` TPDOs, `R` RPDOs, `W`
-/// heartbeats to monitor, and `M` objects that a multiplexed TPDO sends.
+/// heartbeats to monitor, and `M` objects that a multiplexed TPDO sends. `S` is the set of
+/// [`Services`](crate::dictionary::Services); the code of services outside the set is not linked.
 ///
 /// [`device!`](crate::device!) gives the type for a table of rows. PDOs, heartbeats and objects beyond the room do not
 /// work.
-pub type Device<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> =
-    Node<Full<A, N, T, R, W, M>>;
+pub type Device<
+    A,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16 = { crate::dictionary::Services::ALL.bits() },
+> = Node<Full<A, N, T, R, W, M, S>>;
 
 /// A device with NMT, SDO, heartbeat and LSS only, such as a bootloader: an application `A` and an image of `N` bytes.
 ///
@@ -94,6 +102,13 @@ impl<B: Body> Node<B> {
     pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Node<B> {
         self.services.set_bit_rate(bit_rate);
         self
+    }
+
+    /// Reports the bit rate at which the bus runs. PDOs take at most three quarters of it, so that the heartbeat, EMCY and
+    /// SDO always have room. [`with_bit_rate`](Node::with_bit_rate) and a change by LSS set it too; a caller that detects
+    /// the bit rate sets it here.
+    pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.services.set_bus_bit_rate(bit_rate);
     }
 
     /// The node-ID in use.

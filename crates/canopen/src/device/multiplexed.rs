@@ -7,7 +7,7 @@ use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
-use crate::{Instant, NodeId};
+use crate::{Frame, Instant, NodeId};
 
 /// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
 const SCANNER_LIST: u16 = 0x1FA0;
@@ -16,8 +16,15 @@ const DISPATCHING_LIST: u16 = 0x1FD0;
 /// The longest value in a multiplexed PDO, in bytes.
 const LONGEST: u8 = 4;
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Gives the producer its settings and its objects, after any change that may affect them. Unchanged settings keep
     /// the record of the values that have been sent, so nothing is sent again.
@@ -35,8 +42,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if addressing == Some(Addressing::Destination) {
             self.select_watched();
         }
-        if is_new && self.basic.state.has_pdos() {
+        if !self.basic.state.has_pdos() {
+            return;
+        }
+        if is_new {
             self.scanner.start();
+        } else {
+            self.scanner.send_new();
         }
     }
 
@@ -90,8 +102,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Takes an object for this node or for all nodes. A missing object is an error only if this node alone is
-    /// addressed.
+    /// Takes an object for this node or for all nodes. An object that is missing or rejects the value is an error only
+    /// if this node alone is addressed.
     fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Instant) {
         let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
         if !is_taken && node.is_some() {
@@ -99,16 +111,26 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Stores the value, if the object exists and accepts process data. Returns whether it does.
+    /// Whether a frame of any node can be a multiplexed PDO for this node: eight bytes that name an object which
+    /// accepts process data. Any other frame is a PDO of a node that uses the CAN-ID otherwise.
+    pub(super) fn is_mpdo(&self, frame: &Frame) -> bool {
+        let mpdo = if frame.len() == 8 { Mpdo::parse(frame.bytes()) } else { None };
+        mpdo.is_some_and(|mpdo| {
+            matches!(mpdo.address, Address::Source(_)) || self.consumed(mpdo.at).is_some()
+        })
+    }
+
+    /// The entry at this place, if a multiplexed PDO can write it.
+    fn consumed(&self, at: Multiplexer) -> Option<Entry> {
+        let entry = self.basic.dictionary.find(at.index, at.sub).ok()?;
+        (entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST).then_some(entry)
+    }
+
+    /// Stores the value, if the object exists and accepts the value. Returns whether it does.
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
-        let entry = self.basic.dictionary.find(at.index, at.sub).ok();
-        let entry =
-            entry.filter(|entry| entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST);
-        if let Some(entry) = &entry {
-            let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
-            self.store_process_value(entry, bytes);
-        }
-        entry.is_some()
+        let Some(entry) = self.consumed(at) else { return false };
+        let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
+        self.store_process_value(&entry, bytes)
     }
 
     fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
@@ -116,7 +138,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         for line in 0..count {
             let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
             if let Some(at) = target {
-                self.store_mpdo(at, mpdo.data);
+                let _ = self.store_mpdo(at, mpdo.data);
                 return;
             }
         }

@@ -4,7 +4,7 @@ use super::body::Body;
 use super::full::Full;
 use super::pdos::low_half;
 use super::{Application, Job, Part, STALE};
-use crate::dictionary::{Entry, Rule, Type, little_endian};
+use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Instant, emcy, sync};
 
@@ -40,12 +40,14 @@ impl<B: Body> Objects for B {
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
+        self.basic().application.admits(entry)?;
         if entry.is_domain() {
             return write_domain(self, at, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(value)?;
+        let job = self.check_store(entry)?;
         match entry.rule() {
             Rule::Plain => entry.field.set_number(&mut self.basic_mut().image, value, bytes),
             _ => write_by_rule(self, entry, value, bytes, now)?,
@@ -55,7 +57,7 @@ impl<B: Body> Objects for B {
             basic.pending.parameters_changed();
         }
         basic.application.written(entry, &mut basic.image);
-        self.store_at_once(entry)
+        job.map_or(Ok(()), |job| self.store_at_once(job))
     }
 
     fn take_deferred(&mut self) -> bool {
@@ -105,22 +107,38 @@ fn write_by_rule(
     Ok(())
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Whether the rule of the entry allows the value.
     pub(super) fn admit_value(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         match entry.rule() {
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
-            Rule::SyncCobId => sync::check_cob_id(value),
-            Rule::SyncOverflow => sync::check_overflow(value, self.basic().number(0x1006, 0)),
-            Rule::EmcyCobId => emcy::check_cob_id(self.basic().word(entry.field), value),
+            Rule::SyncCobId if Self::has(Services::SYNC) => sync::check_cob_id(value),
+            Rule::SyncOverflow if Self::has(Services::SYNC) => {
+                sync::check_overflow(value, self.basic().number(0x1006, 0))
+            }
+            Rule::EmcyCobId if Self::has(Services::EMCY) => {
+                emcy::check_cob_id(self.basic().word(entry.field), value)
+            }
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
+            Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting
+                if !Self::has(Services::STORE) =>
+            {
+                Err(Abort::NotStored)
+            }
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
             Rule::StoreCalibration => self.admit_store_calibration(value),
             Rule::Setting => self.begin_deferred(Job::Setting(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
-            Rule::HeartbeatWatch => self.admit_watch(entry, value),
+            Rule::HeartbeatWatch if W > 0 => self.admit_watch(entry, value),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType
@@ -137,13 +155,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         match entry.rule() {
             Rule::Application => self.apply_application_changes(now),
             Rule::ErrorCount => self.emcy.clear_history(),
-            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
+            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow
+                if Self::has(Services::SYNC) =>
+            {
                 self.configure_sync(now);
             }
-            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value)),
-            Rule::EmcyCobId => self.emcy.configure(value),
-            Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
-            Rule::ScannerLine => self.configure_pdos(now),
+            Rule::EmcyInhibit if Self::has(Services::EMCY) => self.emcy.set_inhibit(low_half(value), now),
+            Rule::EmcyCobId if Self::has(Services::EMCY) && self.emcy.configure(value) => {
+                self.report_active(now);
+            }
+            Rule::HeartbeatWatch if W > 0 => self.configure_watch(entry.sub(), now),
+            Rule::ScannerLine if M > 0 => self.configure_pdos(now),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType

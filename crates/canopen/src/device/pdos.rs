@@ -8,7 +8,7 @@ use super::Application;
 use super::body::Body;
 use super::full::Full;
 use super::rpdos::filter_bit;
-use crate::dictionary::{Dictionary, Entry, Rule};
+use crate::dictionary::{Dictionary, Entry, Rule, Services};
 use crate::pdo::{
     Addressing, Chain, Content, Direction, Layout, Links, MappedObject, RpdoSettings, ScannerSettings,
     Settings, Transmission, locate,
@@ -54,19 +54,35 @@ impl Pdo {
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Gives every PDO its settings.
     pub(super) fn configure_pdos(&mut self, now: Instant) {
-        for direction in [Direction::Transmit, Direction::Receive] {
+        for direction in Self::directions() {
             for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
                 self.apply(pdo, place, now);
             }
         }
         self.link_pdos();
-        self.configure_scanner(None);
-        self.configure_scanner(self.scanner_settings());
+        if M > 0 {
+            self.configure_scanner(None);
+        }
+        self.update_scanner();
+    }
+
+    /// Gives the multiplexed TPDO its settings, if the rows have one.
+    fn update_scanner(&mut self) {
+        if M > 0 {
+            self.configure_scanner(self.scanner_settings());
+        }
     }
 
     /// Gives the PDO to which the entry belongs its settings.
@@ -76,13 +92,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             self.apply(pdo, place, now);
         }
         self.link_pdos();
-        self.configure_scanner(self.scanner_settings());
+        self.update_scanner();
     }
 
     /// Reconfigures the PDOs that the application has switched on or off.
     pub(super) fn apply_application_changes(&mut self, now: Instant) {
         let mut has_changed = false;
-        for direction in [Direction::Transmit, Direction::Receive] {
+        for direction in Self::directions() {
             for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
                 if self.is_valid(pdo) != self.is_used(pdo, place) {
                     self.apply(pdo, place, now);
@@ -94,14 +110,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             self.link_pdos();
             self.basic.pending.identifiers_changed();
         }
-        self.configure_scanner(self.scanner_settings());
+        self.update_scanner();
     }
 
     /// Whether the PDO is valid according to its objects.
     fn is_valid(&self, pdo: Pdo) -> bool {
         match pdo.direction() {
             Direction::Transmit => self.tpdo_settings(pdo).is_some(),
-            Direction::Receive => self.rpdo_settings(pdo).is_some(),
+            Direction::Receive => R > 0 && self.rpdo_settings(pdo).is_some(),
         }
     }
 
@@ -128,7 +144,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     fn apply(&mut self, pdo: Pdo, place: u16, now: Instant) {
         match pdo.direction() {
             Direction::Transmit => self.configure_tpdo(pdo, place),
-            Direction::Receive => self.configure_rpdo(pdo, place, now),
+            Direction::Receive if R > 0 => self.configure_rpdo(pdo, place, now),
+            Direction::Receive => (),
         }
     }
 
@@ -170,7 +187,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             rpdo.links = self.first_rpdos;
             let Some(id) = rpdo.id() else { continue };
             self.rpdo_filter |= filter_bit(id.get());
-            if rpdo.is_multiplexed() && self.basic.application.takes_all_nodes((rpdo.index & 0x1FF) + 1) {
+            if rpdo.is_multiplexed() && self.basic.application.takes_all_nodes(rpdo.number()) {
                 self.rpdo_filter = u32::MAX;
                 self.all_nodes = u16::try_from(place).ok().map(|place| (id, place));
             }
@@ -209,8 +226,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Whether every mapping contains mappable objects only. A stored mapping may come from an older dictionary.
     pub(super) fn mappings_are_sound(&self) -> bool {
-        let directions = [Direction::Transmit, Direction::Receive].into_iter();
-        let mut pdos = directions.flat_map(|direction| Pdo::all(self.basic.dictionary, direction));
+        let mut pdos = Self::directions().flat_map(|direction| Pdo::all(self.basic.dictionary, direction));
         pdos.all(|pdo| self.content(pdo).is_some())
     }
 
@@ -225,10 +241,26 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         })
     }
 
+    /// The addressing mode of a multiplexed PDO; `None` for a number of mapped objects, and where the rows have no
+    /// multiplexed PDO in this direction.
+    fn addressing(pdo: Pdo, count: u8) -> Option<Addressing> {
+        let is_possible = match pdo.direction() {
+            Direction::Transmit => M > 0,
+            Direction::Receive => Self::has(Services::MULTIPLEXED_RPDO),
+        };
+        if is_possible { Addressing::from_count(count) } else { None }
+    }
+
+    /// The directions in which the rows have PDOs.
+    fn directions() -> impl Iterator<Item = Direction> {
+        let transmit = (T > 0).then_some(Direction::Transmit);
+        transmit.into_iter().chain((R > 0).then_some(Direction::Receive))
+    }
+
     /// The content that the mapping of a PDO describes; `None` when an entry of the mapping cannot be mapped.
     fn content(&self, pdo: Pdo) -> Option<Content> {
         let count = self.mapped(pdo);
-        match Addressing::from_count(count) {
+        match Self::addressing(pdo, count) {
             Some(addressing) => Some(Content::Multiplexed(addressing)),
             None => self.layout(pdo, count).ok().map(Content::Objects),
         }
@@ -299,7 +331,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let transmission = Transmission::parse(low_byte(self.parameter(pdo, 2)));
         let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
         let mapped = self.mapped(pdo);
-        let is_not_sent = Addressing::from_count(mapped).is_some()
+        let is_not_sent = Self::addressing(pdo, mapped).is_some()
             && !transmission.is_some_and(Transmission::is_event_driven);
         let is_taken = !is_predefined && new.id.is_restricted();
         let cannot_exist = moves || contradicts || mapped == 0 || is_not_sent || is_taken;
@@ -310,9 +342,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     fn admit_type(&self, pdo: Pdo, present: Option<CobId>, kind: u8) -> Result<(), Abort> {
         let transmission = Transmission::parse(kind).ok_or(Abort::InvalidValue)?;
         let no_remote = pdo.direction() == Direction::Receive || present.is_some_and(|cob_id| cob_id.bit30);
-        let is_multiplexed = present.is_some() && Addressing::from_count(self.mapped(pdo)).is_some();
+        let is_multiplexed = present.is_some() && Self::addressing(pdo, self.mapped(pdo)).is_some();
         let is_not_sent = is_multiplexed && !transmission.is_event_driven();
-        if is_not_sent || transmission.needs_remote() && no_remote {
+        let has_no_sync = !Self::has(Services::SYNC) && transmission.is_synchronous();
+        if is_not_sent || has_no_sync || transmission.needs_remote() && no_remote {
             return Err(Abort::InvalidValue);
         }
         Ok(())
@@ -320,7 +353,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Checks the mapping as a whole: its length is known only when the count is written.
     fn admit_count(&self, pdo: Pdo, count: u8) -> Result<(), Abort> {
-        if Addressing::from_count(count).is_some() {
+        if Self::addressing(pdo, count).is_some() {
             return Ok(());
         }
         let has_room = count == 0 || self.basic.dictionary.find(pdo.mapping(), count).is_ok();

@@ -3,17 +3,22 @@
 use super::body::Body;
 use super::full::Full;
 use super::{Application, Device, Next, Node, STALE};
+use crate::dictionary::Services;
 use crate::nmt::Command;
 use crate::pdo::{Chain, Rpdo, Tpdo};
-use crate::transmit::Context;
-use crate::{CanId, Frame, Instant, Transmit};
+use crate::transmit::ProcessContext;
+use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 impl<B: Body> Node<B> {
     /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        if self.is_request(frame) {
+            let _ = self.poll_process(now, out);
+            return self.on_service_frame(frame, now, out);
+        }
         self.take_process_frame(frame, now, out);
-        self.take_service_frame(frame, now, out);
+        self.take_other_service(frame, now, out);
         self.services_next()
     }
 
@@ -34,10 +39,12 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let context = &mut self.services.context(now, out);
-        if frame.id() == CanId::NMT.get() {
+        let is_nmt = frame.id() == CanId::NMT.get();
+        if is_nmt {
             self.on_nmt(frame);
-        } else if self.body.basic().state.has_pdos() {
+        }
+        let context = &mut self.services.process_context(now, out);
+        if !is_nmt && self.body.basic().state.has_pdos() {
             self.body.on_pdo_frame(frame, context);
         }
         self.body.send_process(context);
@@ -55,15 +62,22 @@ impl<B: Body> Node<B> {
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().process_due {
-            let context = &mut self.services.context(now, out);
+            let context = &mut self.services.process_context(now, out);
             self.body.send_process(context);
         }
         self.process_next()
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Device<A, N, T, R, W, M, S>
 {
     /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
     /// starts by itself (1F80h), the first `publish` after a start makes the device operational.
@@ -81,7 +95,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
-        let context = &mut self.services.context(now, out);
+        let context = &mut self.services.process_context(now, out);
         let place = self.body.tpdo_place(tpdo);
         if self.body.basic.state.has_pdos()
             && let Some(tpdo) = place.and_then(|place| self.body.tpdos.get_mut(usize::from(place)))
@@ -94,14 +108,16 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
-        let context = &mut self.services.context(now, out);
-        self.self_start(context);
+        let context = &mut self.services.process_context(now, out);
+        self.body.self_start(context);
         if self.body.basic.state.has_pdos() {
             self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
             let events_due = self.body.send_events(context);
-            self.body.scanner.on_change(&self.body.basic.image, context);
-            self.body.basic.process_due =
-                self.body.basic.process_due.min(self.body.scanner.due()).min(events_due);
+            self.body.basic.process_due = self.body.basic.process_due.min(events_due);
+            if M > 0 {
+                self.body.scanner.on_change(&self.body.basic.image, context);
+                self.body.basic.process_due = self.body.basic.process_due.min(self.body.scanner.due());
+            }
         }
         self.body.send_process(context);
     }
@@ -122,15 +138,23 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     fn own_process_ids(&self) -> impl Iterator<Item = CanId> {
         let received = self.body.rpdos.iter().filter_map(Rpdo::id);
         let requests = self.body.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
-        [CanId::NMT, self.body.sync.id()].into_iter().chain(received).chain(requests.map(|tpdo| tpdo.id))
+        let sync = Some(self.body.sync.id()).filter(|_| Services::from_bits(S).contains(Services::SYNC));
+        [CanId::NMT].into_iter().chain(sync).chain(received).chain(requests.map(|tpdo| tpdo.id))
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
-    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
-        if self.sync.accepts(frame) {
+    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
+        if Self::has(Services::SYNC) && self.sync.accepts(frame) {
             self.on_sync(frame, context);
         } else if frame.is_remote() {
             self.each_tpdo(Chain::Valid, |tpdo, image| {
@@ -138,7 +162,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                     tpdo.on_remote(image, context);
                 }
             });
-        } else {
+        } else if R > 0 {
             self.on_rpdo(frame, context.now);
         }
     }
@@ -156,15 +180,25 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     #[inline(never)]
-    pub(super) fn run_process(&mut self, context: &mut Context<'_, impl Transmit>) {
-        self.poll_sync(context.now);
-        let mut due = self.poll_rpdos(context.now);
+    pub(super) fn run_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        if Self::has(Services::SYNC) {
+            self.poll_sync(context.now);
+        }
+        let mut due = if R > 0 { self.poll_rpdos(context.now) } else { Instant::NEVER };
         self.each_tpdo(Chain::Valid, |tpdo, image| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });
         due = due.min(self.send_events(context));
-        self.scanner.poll(&self.basic.image, context);
-        self.basic.process_due = due.min(self.scanner.due()).min(self.sync.due());
+        if M > 0 {
+            self.scanner.poll(&self.basic.image, context);
+            due = due.min(self.scanner.due());
+        }
+        if Self::has(Services::SYNC) {
+            due = due.min(self.sync.due());
+        }
+        // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
+        debug_assert!(due > context.now, "process data are still due after a poll");
+        self.basic.process_due = due.max(context.now.plus(Duration(1)));
     }
 }

@@ -3,13 +3,19 @@
 use super::body::Body;
 use super::full::Full;
 use super::{Application, STALE};
-use crate::dictionary::{Entry, Rule, little_endian};
-use crate::emcy::Fault;
+use crate::dictionary::{Entry, Rule, Services, little_endian};
 use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Takes a data frame that may be an RPDO. A valid frame clears the faults of its RPDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
@@ -25,10 +31,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.take_rpdo(place, frame, now);
             }
         }
-        // A frame that has no RPDO of its own goes to the RPDO for all nodes.
-        if let Some((id, place)) = self.all_nodes
+        // A frame that has no RPDO of its own goes to the RPDO for all nodes, if it can be a multiplexed PDO.
+        if Self::has(Services::MULTIPLEXED_RPDO)
+            && let Some((id, place)) = self.all_nodes
             && !is_own
             && id.is_of_same_service(frame.id())
+            && self.is_mpdo(frame)
         {
             self.take_rpdo(place.into(), frame, now);
         }
@@ -36,14 +44,16 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Instant) {
         let Some(rpdo) = self.rpdos.get_mut(place) else { return };
-        let late = rpdo.is_synchronous() && self.sync.is_window_over(now);
+        let late = Self::has(Services::SYNC) && rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
         self.basic.process_due = self.basic.process_due.min(rpdo.due());
         let has_faults = rpdo.has_faults();
         if is_valid {
             self.store_rpdo(place, frame.bytes());
         }
-        if let Reception::Multiplexed(addressing) = reception {
+        if Self::has(Services::MULTIPLEXED_RPDO)
+            && let Reception::Multiplexed(addressing) = reception
+        {
             self.on_mpdo(frame.bytes(), addressing, now);
         }
         if reception != Reception::Complete || has_faults {
@@ -54,12 +64,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Writes the data of an RPDO to the image, and notifies the application.
     pub(super) fn store_rpdo(&mut self, place: usize, data: [u8; 8]) {
         let Some(rpdo) = self.rpdos.get(place) else { return };
-        let index = rpdo.index;
+        let (index, number) = (rpdo.index, rpdo.number());
         match rpdo.layout() {
             Some(layout) if !layout.is_checked() => layout.scatter(data, &mut self.basic.image),
             _ => self.store_checked(index, data),
         }
-        self.basic.application.received((index & 0x1FF) + 1, &mut self.basic.image);
+        self.basic.application.received(number, &mut self.basic.image);
     }
 
     /// Writes the data of an RPDO whose objects have limits or rules. Each value is checked as in an SDO download; a
@@ -74,25 +84,28 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             let size = usize::from(mapped.bits / 8);
             let Some((bytes, behind)) = rest.split_at_checked(size) else { return };
             if let Ok(entry) = entry {
-                self.store_process_value(&entry, bytes);
+                let _ = self.store_process_value(&entry, bytes);
             }
             rest = behind;
         }
     }
 
-    /// Writes a value from a PDO, if the object accepts it.
-    pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) {
+    /// Writes a value from a PDO, if the object accepts it. Returns whether it does.
+    pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) -> bool {
+        let Ok(job) = self.check_store_at_once(entry) else { return false };
         let is_allowed = entry.check_value(little_endian(bytes)).is_ok()
             && (entry.rule() != Rule::Application
                 || self.basic.application.write(entry, bytes, &mut self.basic.image).is_ok());
         if !is_allowed {
-            return;
+            return false;
         }
         entry.field.set(&mut self.basic.image, bytes);
         if entry.rule() == Rule::Application || entry.is_parameter() {
             self.basic.pending.parameters_changed();
             self.basic.services_due = STALE;
         }
+        self.begin_checked(job);
+        true
     }
 
     #[inline(never)]
@@ -110,13 +123,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if !rpdo.set_fault(kind, active) {
             return;
         }
-        let number = u16::try_from(place).unwrap_or(u16::MAX);
-        let fault = match kind {
-            RpdoFault::TooShort => Fault::RpdoTooShort(number),
-            RpdoFault::TooLong => Fault::RpdoTooLong(number),
-            RpdoFault::Deadline => Fault::RpdoDeadline(number),
-        };
-        if active { self.raise(fault, now) } else { self.clear(fault, now) }
+        let fault = rpdo.fault(kind);
+        self.set_fault(fault, active, now);
     }
 
     /// Detects missing RPDOs. Returns the next deadline.
@@ -136,7 +144,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Clears the faults of a PDO that is reconfigured.
     pub(super) fn forget_rpdo_faults(&mut self, place: u16, now: Instant) {
-        for kind in [RpdoFault::TooShort, RpdoFault::TooLong, RpdoFault::Deadline] {
+        for kind in RpdoFault::ALL {
             self.set_rpdo_fault(place.into(), kind, false, now);
         }
     }

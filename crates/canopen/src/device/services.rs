@@ -5,8 +5,9 @@ use super::lss::LssSlave;
 use super::{Application as _, Next, Node, STALE};
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
+use crate::pdo::Budget;
 use crate::sdo::{Abort, Server};
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{Context, ProcessContext, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
@@ -26,6 +27,8 @@ pub(super) struct Services {
     /// When to continue a block that found the queue full.
     block_due: Instant,
     lss: LssSlave,
+    /// The share of process data in the bus.
+    budget: Budget,
 }
 
 impl Services {
@@ -36,11 +39,18 @@ impl Services {
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: LssSlave::new(node_id),
+            budget: Budget::new(BitRate::FASTEST.kbit()),
         }
     }
 
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
         self.lss.set_bit_rate(bit_rate);
+        self.set_bus_bit_rate(bit_rate);
+    }
+
+    /// Sets the bit rate at which the bus runs.
+    pub(super) fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
+        self.budget.set_bit_rate(bit_rate.kbit());
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.
@@ -49,6 +59,12 @@ impl Services {
         self.lss.restart();
         self.sdo_request = sdo_request(self.lss.node_id());
         self.lss.node_id()
+    }
+
+    /// Whether no client waits for a response, except for that of a job.
+    pub(super) fn is_between_requests(&self) -> bool {
+        let waits = self.reply_due.min(self.block_due).min(self.lss.due());
+        self.server.is_between_requests() && waits == Instant::NEVER
     }
 
     fn forget_transfer(&mut self) {
@@ -61,6 +77,16 @@ impl Services {
     pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
         Context { now, out, is_open: !self.lss.is_switching() }
     }
+
+    /// The same for process data, which have a share of the bus.
+    pub(super) fn process_context<'a, Q: Transmit>(
+        &'a mut self,
+        now: Instant,
+        out: &'a mut Q,
+    ) -> ProcessContext<'a, Q> {
+        self.budget.begin(now, || out.has_waiting_pdo());
+        ProcessContext { now, out, is_open: !self.lss.is_switching(), budget: &mut self.budget }
+    }
 }
 
 /// The CAN-ID of requests to the SDO server. Without a node-ID, the CAN-ID for node-ID 0, which no client uses.
@@ -72,10 +98,18 @@ impl<B: Body> Node<B> {
     /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        if self.services.server.takes_block() && self.take_segment(frame, now) {
-            return self.process_next();
+        match frame.full(self.services.sdo_request) {
+            Some(request) => {
+                // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
+                // transfer.
+                let server = &mut self.services.server;
+                if server.takes_block() && server.take_segment(request, now) {
+                    return self.process_next();
+                }
+                self.take_request(request, now, out);
+            }
+            None => self.take_other_service(frame, now, out),
         }
-        self.take_service_frame(frame, now, out);
         self.services_next()
     }
 
@@ -94,26 +128,36 @@ impl<B: Body> Node<B> {
         [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
     }
 
-    /// Takes a frame if it is a block segment that needs no further processing. Called in any state: without SDO, there
-    /// is no transfer.
-    #[inline]
-    fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
-        let request = frame.full(self.services.sdo_request);
-        request.is_some_and(|request| self.services.server.take_segment(request, now))
+    /// Takes a request to the SDO server.
+    #[inline(never)]
+    #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
+    fn take_request(&mut self, request: &[u8; 8], now: Instant, out: &mut impl Transmit) {
+        if self.body.basic().state.has_services() {
+            self.on_request(request, &mut self.services.context(now, out));
+        }
+        self.send_due_services(now, out);
     }
 
+    /// Takes a frame that is no request to the SDO server: LSS, or the heartbeat of another node.
     #[inline(never)]
-    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        if let Some(request) = frame.full(self.services.sdo_request) {
-            if self.body.basic().state.has_services() {
-                self.on_request(request, &mut self.services.context(now, out));
-            }
-        } else if frame.id() == lss::REQUEST.get() {
+    pub(super) fn take_other_service(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if frame.id() == lss::REQUEST.get() {
             let context = &mut self.services.context(now, out);
             self.services.lss.take_frame(frame, context, &mut self.body);
         } else if frame.id() & 0x780 == ERROR_CONTROL {
             self.body.on_heartbeat(frame, now);
         }
+        self.send_due_services(now, out);
+    }
+
+    /// Whether a frame is a request to the SDO server.
+    #[inline]
+    pub(super) fn is_request(&self, frame: &Frame) -> bool {
+        frame.full(self.services.sdo_request).is_some()
+    }
+
+    #[inline]
+    fn send_due_services(&mut self, now: Instant, out: &mut impl Transmit) {
         if now >= self.body.basic().services_due {
             self.send_services(now, out);
         }
@@ -145,7 +189,7 @@ impl<B: Body> Node<B> {
         let has_reply = server.send_block(&self.body, context.now, |data| {
             context.room() > B::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
-        let block_due = if server.is_sending() { context.now + RETRY } else { Instant::NEVER };
+        let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Instant::NEVER };
         self.services.block_due = block_due;
         self.body.basic_mut().serve_until(block_due);
         if has_reply {
@@ -161,7 +205,7 @@ impl<B: Body> Node<B> {
         if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
             self.services.reply_due = Instant::NEVER;
         } else {
-            self.services.reply_due = context.now + RETRY;
+            self.services.reply_due = context.now.plus(RETRY);
             basic.serve_until(self.services.reply_due);
         }
     }
@@ -191,24 +235,37 @@ impl<B: Body> Node<B> {
 
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.services.lss.poll_switching(now, &mut self.body);
+        if let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.body) {
+            self.services.set_bus_bit_rate(bit_rate);
+        }
         let context = &mut self.services.context(now, out);
         self.services.lss.poll(context);
-        let basic = self.body.basic_mut();
-        if !basic.is_initialising() {
+        if !self.body.basic().is_initialising() {
+            // Nothing precedes the boot-up message. Any other heartbeat follows the EMCY that gives the reason for a new
+            // state.
+            let boots_up = self.body.basic().heartbeat.boots_up();
+            if !boots_up {
+                self.body.poll_errors(context);
+            }
+            let basic = self.body.basic_mut();
             let id = basic.service(ERROR_CONTROL);
             basic.heartbeat.poll(id, basic.state, context);
-            self.body.poll_errors(context);
+            if boots_up {
+                self.body.poll_errors(context);
+            }
             self.silence_services();
         }
         if self.body.basic().state.has_services() {
             self.poll_sdo(context);
         }
         self.body.basic_mut().services_due = self.next_service();
+        debug_assert!(self.body.basic().services_due > now, "what is due does not stay due");
     }
 
     fn poll_sdo(&mut self, context: &mut Context<'_, impl Transmit>) {
-        if context.now >= self.services.reply_due || self.services.server.expire(context.now) {
+        // Both are checked: the deadline of the transfer may have passed while a reply waited for room.
+        let is_expired = self.services.server.expire(context.now);
+        if is_expired || context.now >= self.services.reply_due {
             self.respond(context);
         }
         if B::Application::BLOCK_UPLOAD && context.now >= self.services.block_due {

@@ -2,11 +2,12 @@
 
 use super::basic::Basic;
 use super::body::Body;
+use super::full::Full;
 use super::pdos::low_half;
-use super::{Action, Application, Device, Job, Next, Node, STALE};
+use super::{Action, Application, Job, Next, Node, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
-use crate::transmit::Context;
+use crate::transmit::ProcessContext;
 use crate::{Instant, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.
@@ -23,7 +24,7 @@ enum Reset {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Scope {
     Everything,
-    /// The objects below 2000h.
+    /// The objects below 2000h, and others that are stored with them.
     Communication,
     Group(Group),
 }
@@ -32,7 +33,9 @@ impl Scope {
     fn contains(self, entry: &Entry) -> bool {
         match self {
             Scope::Everything => true,
-            Scope::Communication => entry.index() < 0x2000,
+            Scope::Communication => {
+                entry.index() < 0x2000 || entry.attributes.group == Some(Group::Communication)
+            }
             Scope::Group(group) => entry.attributes.group == Some(group),
         }
     }
@@ -49,9 +52,9 @@ pub(super) struct Pending {
     reset_is_new: bool,
     identifiers: bool,
     parameters: bool,
-    /// The NMT state to enter with the first values, if 1F80h asks for it: before, PDOs would carry values nobody has
-    /// measured.
-    pub(super) self_start_state: Option<State>,
+    /// The NMT state to enter later: Operational with the first measured values, if 1F80h asks for it; Stopped when the
+    /// EMCYs of an error are sent, if 1029h asks for it. A command of the master cancels both.
+    pub(super) next_state: Option<State>,
     /// A request of LSS or of program control.
     request: Option<Action>,
     /// A job to store or restore values.
@@ -66,7 +69,7 @@ impl Pending {
             reset_is_new: false,
             identifiers: false,
             parameters: false,
-            self_start_state: None,
+            next_state: None,
             request: None,
             job: None,
         }
@@ -94,6 +97,11 @@ impl Pending {
     /// Asks the caller to store or restore values.
     pub(super) fn ask_for(&mut self, job: Job) {
         (self.job, self.is_waiting) = (Some(job), true);
+    }
+
+    /// Whether a job waits to be handed over.
+    pub(super) fn has_job(&self) -> bool {
+        self.job.is_some()
     }
 
     pub(super) fn identifiers_changed(&mut self) {
@@ -124,7 +132,7 @@ impl Pending {
 
 impl<B: Body> Node<B> {
     /// Initialises the scope of the last reset (the first time, everything) and boots up. If 1F80h asks for it, a
-    /// [`Device`] starts by itself with the next [`publish`](Device::publish). A node-ID that LSS has configured is
+    /// [`Device`](super::Device) starts by itself with the next [`publish`](super::Device::publish). A node-ID that LSS has configured is
     /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let node_id = self.services.restart();
@@ -154,7 +162,7 @@ impl<B: Body> Node<B> {
 
     pub(super) fn command(&mut self, command: Command) {
         let pending = &mut self.body.basic_mut().pending;
-        pending.self_start_state = None;
+        pending.next_state = None;
         let state = match command {
             Command::Start => State::Operational,
             Command::Stop => State::Stopped,
@@ -217,16 +225,23 @@ impl<A: Application> Basic<A, [u8]> {
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
-    pub(super) fn self_start(&mut self, context: &mut Context<'_, impl Transmit>) {
-        let Some(state) = self.body.basic.pending.self_start_state.take() else { return };
-        if self.body.emcy.register() == 0 {
-            self.body.enter(state);
-            self.body.send_process(context);
+    pub(super) fn self_start(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        let next_state = &mut self.basic.pending.next_state;
+        if next_state.take_if(|state| *state == State::Operational).is_some() && self.emcy.register() == 0 {
+            self.enter(State::Operational);
+            self.send_process(context);
         }
     }
 }

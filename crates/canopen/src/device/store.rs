@@ -6,12 +6,13 @@
 use super::body::Body;
 use super::full::Full;
 use super::state::Scope;
-use super::{Action, Application, Device, Next};
+use super::{Action, Application, Device, Next, STALE};
 use crate::dictionary::{Entry, Group, Groups, Rule};
 use crate::emcy::Fault;
 use crate::lss::Configuration;
+use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::{Instant, Transmit};
+use crate::{Duration, Instant, Transmit};
 
 /// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -22,7 +23,9 @@ const STOP_PROGRAM: u32 = 0;
 const START_PROGRAM: u32 = 1;
 const RESET_PROGRAM: u32 = 2;
 
-/// A job to store or restore values. The caller reports its end by [`Device::finish`].
+/// A job to store or restore values. The caller copies the values after the job has been handed over, and reports its
+/// end by [`Device::finish`]. If another request for the same [`Job::Store`] comes in between, there may be newer values:
+/// the device hands the job over a second time, and the response waits for the second run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Job {
@@ -61,6 +64,8 @@ pub enum Soundness {
 #[derive(Debug)]
 pub(super) struct Jobs {
     running: Option<Job>,
+    /// An equal request has followed the handover, so the job runs a second time.
+    is_repeated: bool,
     /// Whether the SDO request just served has begun the job or waits for it.
     is_deferred: bool,
     lss_waits: bool,
@@ -68,24 +73,66 @@ pub(super) struct Jobs {
 
 impl Jobs {
     pub(super) const fn new() -> Jobs {
-        Jobs { running: None, is_deferred: false, lss_waits: false }
+        Jobs { running: None, is_repeated: false, is_deferred: false, lss_waits: false }
     }
 
     /// Whether the response to the request just served has to wait. Returns `true` once.
     pub(super) fn take_deferred(&mut self) -> bool {
         core::mem::take(&mut self.is_deferred)
     }
+
+    /// The job that has to run a second time.
+    fn take_repeated(&mut self) -> Option<Job> {
+        self.running.filter(|_| core::mem::take(&mut self.is_repeated))
+    }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Device<A, N, T, R, W, M, S>
 {
-    /// Reports the end of the job: `result` goes to the clients that wait for it.
+    /// Reports the end of the job: `result` goes to the clients that wait for it. If an equal request has followed the
+    /// handover, the job is handed over again instead, and the clients wait for the second run.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
+        if let Some(job) = self.body.jobs.take_repeated() {
+            self.body.basic.pending.ask_for(job);
+            self.body.basic.services_due = STALE;
+            return self.process_next();
+        }
         let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
         let context = &mut self.services.context(now, out);
         self.finish_job(result, lss_waits, context);
         self.process_next()
+    }
+}
+
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Device<A, N, T, R, W, M, S>
+{
+    /// Whether a pause of `span` disturbs no service, for example while the erase of a flash page stops the core. The
+    /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
+    /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and no heartbeat of another node (1016h) is
+    /// due.
+    #[must_use]
+    pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
+        let basic = &self.body.basic;
+        matches!(basic.state, State::PreOperational | State::Stopped)
+            && self.services.is_between_requests()
+            && now + span <= basic.heartbeat.latest()
+            && now + span <= self.body.watches.due()
     }
 }
 
@@ -95,20 +142,50 @@ impl Default for Jobs {
     }
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
-    /// Hands a job to the caller. A second request for the same job waits for the first. Another job is refused
-    /// meanwhile.
-    fn begin(&mut self, job: Job) -> Result<(), Abort> {
+    /// Whether a job could begin now. Another job is refused while one runs.
+    fn check_job(&self, job: Job) -> Result<(), Abort> {
         match self.jobs.running {
             Some(running) if running != job => Err(Abort::DeviceState),
-            Some(_) => Ok(()),
-            None => {
-                self.jobs.running = Some(job);
-                self.basic.pending.ask_for(job);
-                Ok(())
-            }
+            _ => self.basic.application.can_store(),
+        }
+    }
+
+    /// Hands a job to the caller. An equal [`Job::Store`] that has been handed over already runs again, because its
+    /// values may have been copied before this request. The other jobs carry their values.
+    fn begin(&mut self, job: Job) -> Result<(), Abort> {
+        self.check_job(job)?;
+        if self.jobs.running.is_none() {
+            self.jobs.running = Some(job);
+            self.basic.pending.ask_for(job);
+        } else if matches!(job, Job::Store(_)) && !self.basic.pending.has_job() {
+            self.jobs.is_repeated = true;
+        }
+        Ok(())
+    }
+
+    /// The job that a write to the entry begins, for an entry that the application stores at once. Nothing changes: an
+    /// error refuses the write.
+    pub(super) fn check_store_at_once(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
+        let job = self.basic.application.stores(entry).map(Job::Store);
+        job.map_or(Ok(()), |job| self.check_job(job))?;
+        Ok(job)
+    }
+
+    /// Begins a job for a value that was received by PDO. No client waits.
+    pub(super) fn begin_checked(&mut self, job: Option<Job>) {
+        if let Some(job) = job {
+            let _ = self.begin(job);
+            self.basic.services_due = STALE;
         }
     }
 
@@ -148,7 +225,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
         match value {
             STOP_PROGRAM | RESET_PROGRAM => {
-                self.basic.application.stop_program()?;
                 self.basic.pending.ask(Action::Bootloader);
                 self.jobs.is_deferred = true;
                 Ok(())
@@ -161,7 +237,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Loads the stored values of a group. If they are damaged or do not fit, the whole group keeps its defaults.
     pub(super) fn load_stored(&mut self, group: Group) {
         let Stored { packed, soundness } = self.basic.application.stored(group);
-        let fits = self.basic.dictionary.unpack(group, packed, &mut self.basic.image).is_ok()
+        let (dictionary, node_id) = (self.basic.dictionary, self.basic.node_id);
+        // An application that stores nothing returns this constant, and the compiler removes the rest.
+        if packed.is_empty() && soundness == Soundness::Whole {
+            self.lost.set(group, false);
+            self.older.set(group, false);
+            return self.basic.application.loaded(group, true);
+        }
+        let fits = dictionary.unpack(group, node_id, packed, &mut self.basic.image).is_ok()
             && self.mappings_are_sound();
         if !fits {
             self.basic_mut().load_defaults(Scope::Group(group));

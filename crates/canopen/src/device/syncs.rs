@@ -6,11 +6,18 @@ use super::{Application, STALE};
 use crate::emcy::Fault;
 use crate::pdo::Chain;
 use crate::sync::Settings;
-use crate::transmit::Context;
+use crate::transmit::ProcessContext;
 use crate::{Frame, Instant, Transmit};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     pub(super) fn configure_sync(&mut self, now: Instant) {
         let [overflow, ..] = self.basic().number(0x1019, 0).to_le_bytes();
@@ -23,7 +30,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.clear(Fault::SyncMissing, now);
     }
 
-    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         let Ok(sync) = self.sync.take(frame, context.now) else {
             return self.report(Fault::SyncLength, context.now);
         };

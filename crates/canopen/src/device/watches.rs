@@ -11,8 +11,15 @@ use crate::{Frame, Instant};
 
 const CONSUMER_TIME: u16 = 0x1016;
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Full<A, N, T, R, W, M>
+impl<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+    const S: u16,
+> Full<A, N, T, R, W, M, S>
 {
     #[inline(never)]
     pub(super) fn take_heartbeat(&mut self, frame: &Frame, now: Instant) {

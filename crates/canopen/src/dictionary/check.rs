@@ -1,95 +1,135 @@
 //! Checks of a table of rows at compile time. The code at run time relies on them. A panic here is a compile error.
-#![allow(clippy::indexing_slicing, clippy::panic, reason = "evaluated by the compiler")]
 
-use super::compile::{effective_limits, event_timer};
+use super::check_pdos::check_pdo_row;
+use super::compile::{effective_limits, find};
+use super::fail::{fail, require};
 use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
 use crate::sdo::BUFFER;
 
 /// Checks a table: the rows are sorted, no entry occurs twice, every default has the type of its entry and is within
-/// its limits, every object has sub-index 0, and the attributes of a row fit together.
+/// its limits, every object has sub-index 0, the attributes of a row fit together, every entry of CiA 301 keeps its
+/// service, and the default of every PDO can be sent or received.
 ///
 /// # Panics
-/// During compilation, when a row is wrong.
+/// During compilation, when a row is wrong. The message begins with index and sub-index of the row.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 pub const fn check(rows: &[Object]) {
-    assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
+    assert!(image_size(rows) <= u16::MAX as usize, "the values of the table take more than 65535 bytes");
     let mut i = 0;
     while i < rows.len() {
-        check_row(&rows[i]);
+        let row = &rows[i];
         if i > 0 {
-            assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
+            require(rows[i - 1].key() != row.key(), row, "the row is there twice");
+            require(rows[i - 1].key() < row.key(), row, "the rows are not sorted by index and sub-index");
         }
-        let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
-        assert!(has_sub_0, "an object has no sub-index 0");
-        assert!(rows[i].sub < u8::MAX, "an object has more entries than a series can");
-        let is_pdo = matches!(rows[i].index, 0x1400..=0x15FF | 0x1800..=0x19FF);
-        assert!(!is_pdo || rows[i].sub > 0 || has(rows, rows[i].key() | 1), "a PDO has no COB-ID");
-        if let Rule::EventTimerOf(number) = rows[i].rule {
-            let timer = &rows[event_timer(rows, number)];
-            assert!(
-                matches!(timer.access, Access::ReadWrite),
-                "an event timer is written under its other name"
-            );
-            assert!(timer.limits.is_none() && rows[i].limits.is_none(), "an event timer has no limits");
-        }
+        let has_sub_0 = row.sub == 0 || (i > 0 && rows[i - 1].index == row.index);
+        require(has_sub_0, row, "the object has no sub-index 0");
+        check_row(row);
+        i += 1;
+    }
+    // The order of the rows is checked by now: they are found by a binary search.
+    i = 0;
+    while i < rows.len() {
+        check_event_timer(rows, &rows[i]);
+        check_pdo_row(rows, &rows[i]);
         i += 1;
     }
 }
 
-const fn has(rows: &[Object], key: u32) -> bool {
-    let mut i = 0;
-    while i < rows.len() && rows[i].key() != key {
-        i += 1;
-    }
-    i < rows.len()
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+const fn check_event_timer(rows: &[Object], row: &Object) {
+    let Rule::EventTimerOf(number) = row.rule else { return };
+    let Some(timer) = find(rows, 0x1800 | number as u16, 5) else {
+        fail(row.index, row.sub, "the TPDO has no event timer (sub-index 5)")
+    };
+    let is_writable = matches!(rows[timer].access, Access::ReadWrite);
+    require(
+        is_writable,
+        &rows[timer],
+        "the event timer is read-only, but has another name that can be written",
+    );
+    let has_limits = rows[timer].limits.is_some() || row.limits.is_some();
+    require(!has_limits, row, "an event timer with two names has no limits");
 }
 
 const fn check_row(row: &Object) {
+    require(row.sub < u8::MAX, row, "an object has at most 255 entries, 0 to 254");
+    check_rule(row);
     check_limits(row);
-    match (row.default, row.kind) {
-        (DefaultValue::Integer(value), _) => {
-            let (low, high) = effective_limits(row);
-            assert!(
-                row.kind.range().is_some() && low <= value && value <= high,
-                "the default is out of range"
-            );
-        }
-        (DefaultValue::Real(value), Type::Real32) => {
-            assert!(value.is_finite(), "the default is not a number");
-        }
-        (DefaultValue::Text(text), Type::VisibleString(capacity)) => {
-            assert!(capacity as usize <= BUFFER, "an SDO transfer has no room for the text");
-            assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
-        }
-        (DefaultValue::NodeId(_), Type::Unsigned32) | (DefaultValue::None, Type::Domain) => (),
-        _ => panic!("the default is of another type"),
-    }
-    let mappable = !matches!(row.mapping, Mapping::No);
-    let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
-    assert!(!mappable || fits, "a mapped object has no place in a PDO");
-    assert!(!mappable || row.stored_size() > 0, "a mapped object has no place in the image");
+    check_default(row);
+    check_mapping(row);
     // A read-only value can be stored too, such as the offset that the device computes from a preset.
     let lasts = matches!(row.access, Access::ReadWrite | Access::ReadOnly);
-    assert!(row.group.is_none() || lasts, "only a parameter or what the device has found can be stored");
-    assert!(!row.mapping.allows_tpdo() || row.access.is_readable(), "a TPDO sends what can be read");
-    assert!(!row.mapping.allows_rpdo() || row.access.is_writable(), "an RPDO writes what can be written");
+    require(row.group.is_none() || lasts, row, "a constant or a command cannot be stored");
+}
+
+const fn check_default(row: &Object) {
+    match (row.default, row.kind) {
+        (DefaultValue::Integer(value), _) => {
+            require(row.kind.range().is_some(), row, "the default is an integer, the entry is not");
+            let (low, high) = effective_limits(row);
+            require(low <= value && value <= high, row, "the default is out of range");
+        }
+        (DefaultValue::Real(value), Type::Real32) => {
+            require(value.is_finite(), row, "the default is infinite or not a number");
+        }
+        (DefaultValue::Text(text), Type::VisibleString(capacity)) => {
+            require(capacity as usize <= BUFFER, row, "the string is longer than an SDO transfer can be");
+            require(text.is_ascii(), row, "the default is not ASCII");
+            require(text.len() <= capacity as usize, row, "the default is longer than the string");
+        }
+        (DefaultValue::NodeId(_), Type::Unsigned32) | (DefaultValue::None, Type::Domain) => (),
+        _ => fail(row.index, row.sub, "the default is of another type than the entry"),
+    }
+}
+
+const fn check_mapping(row: &Object) {
+    let mappable = !matches!(row.mapping, Mapping::No);
+    let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
+    require(!mappable || fits, row, "a mappable object has one to eight bytes");
+    require(!mappable || row.stored_size() > 0, row, "a mappable object has a value in the image");
+    let is_sent = row.mapping.allows_tpdo();
+    require(!is_sent || row.access.is_readable(), row, "a TPDO cannot carry a write-only object");
+    let is_received = row.mapping.allows_rpdo();
+    require(!is_received || row.access.is_writable(), row, "an RPDO cannot write a read-only object");
     let takes_values = matches!(row.rule, Rule::Plain | Rule::Application);
-    assert!(!row.mapping.allows_rpdo() || takes_values, "an RPDO writes no object of the protocol");
+    require(!is_received || takes_values, row, "an RPDO cannot write an object with a service");
+}
+
+/// The rule of a row is that of its index, so an entry of CiA 301 keeps its service.
+const fn check_rule(row: &Object) {
+    let own = Rule::of(row.index, row.sub);
+    let is_chosen = match own {
+        Rule::Plain => matches!(
+            row.rule,
+            Rule::Application | Rule::Setting | Rule::StoreCalibration | Rule::EventTimerOf(_)
+        ),
+        Rule::PdoCobId => matches!(row.rule, Rule::PdoPredefined),
+        // A bootloader controls the program itself.
+        Rule::ProgramControl => matches!(row.rule, Rule::Application),
+        _ => false,
+    };
+    let fits = is_chosen || own.code() == row.rule.code();
+    require(
+        fits,
+        row,
+        "the entry would lose its service: no handled(), setting() and the like for this index",
+    );
     if let Some(size) = row.rule.size() {
-        assert!(row.kind.size() == size, "the object has another type");
+        require(row.kind.size() == size, row, "the service of the entry needs a type of another size");
     }
     let is_time = matches!(row.kind, Type::Unsigned16) && row.group.is_none();
-    assert!(
-        !matches!(row.rule, Rule::EventTimerOf(_)) || is_time,
-        "an event timer is saved under its own index"
-    );
-    let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
-    assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
+    let is_timer = matches!(row.rule, Rule::EventTimerOf(_));
+    require(!is_timer || is_time, row, "another name of an event timer is an UNSIGNED16 without a group");
 }
 
 const fn check_limits(row: &Object) {
     if let Some((low, high)) = row.limits {
-        let Some((min, max)) = row.kind.range() else { panic!("limits of what is not an integer") };
-        assert!(min <= low && low <= high && high <= max, "limits are wider than the type");
-        assert!(row.kind.size() <= 4, "limits of more than 32 bits are not checked");
+        let Some((min, max)) = row.kind.range() else {
+            fail(row.index, row.sub, "only an integer has limits");
+        };
+        require(low <= high, row, "the lower limit is above the upper one");
+        require(min <= low && high <= max, row, "the limits are wider than the type");
+        require(row.kind.size() <= 4, row, "an integer of more than 32 bits has no limits");
     }
 }

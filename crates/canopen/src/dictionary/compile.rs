@@ -2,7 +2,7 @@
 #![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use super::builder::{TableBuilder, attributes, is_same, larger};
-use super::{Access, Dictionary, Object, Tables, Type, check};
+use super::{Access, Dictionary, Object, Services, Tables, Type, check};
 
 /// The number of rows in all parts of a table.
 #[must_use]
@@ -35,7 +35,19 @@ pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
     rows
 }
 
-/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check) first.
+/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check) first: a wrong table
+/// does not compile, and the error names index and sub-index of the row.
+///
+/// ```compile_fail
+/// use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
+/// use canopen::objects;
+///
+/// const INPUT: Object =
+///     Object::new(0x6000, 0, "Input", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
+///
+/// // evaluation panicked: 1A00h:1: the mapped object is not in the table
+/// static DICTIONARY: Dictionary = canopen::dictionary!(&objects::tpdo(1, &[INPUT]));
+/// ```
 #[macro_export]
 macro_rules! dictionary {
     ($rows:expr) => {{
@@ -140,16 +152,24 @@ impl<const D: usize, const S: usize, const P: usize, const A: usize, const V: us
     }
 }
 
-/// The row of the event timer of a TPDO.
-///
-/// # Panics
-/// During compilation, when there is none.
-pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
-    let mut row = 0;
-    while rows[row].key() != (0x1800 | number as u32) << 8 | 5 {
-        row += 1;
+/// The position of a row in a sorted table.
+pub(super) const fn find(rows: &[Object], index: u16, sub: u8) -> Option<usize> {
+    let key = (index as u32) << 8 | sub as u32;
+    let (mut low, mut high) = (0, rows.len());
+    while low < high {
+        let middle = low.midpoint(high);
+        if rows[middle].key() < key {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
     }
-    row
+    if low < rows.len() && rows[low].key() == key { Some(low) } else { None }
+}
+
+/// The row of the event timer of a TPDO. `check` has verified that there is one.
+pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
+    find(rows, 0x1800 | number as u16, 5).expect("the TPDO has no event timer")
 }
 
 /// How many series the objects of a table form.
@@ -232,13 +252,16 @@ pub struct Sizes {
     pub watches: usize,
     /// Number of objects that a multiplexed TPDO can send; 0 if no TPDO can be multiplexed.
     pub scanned: usize,
+    /// The services that the rows ask for.
+    pub services: Services,
 }
 
 impl Sizes {
     /// The room that these rows need.
     #[must_use]
     pub const fn of(rows: &[Object]) -> Sizes {
-        let mut sizes = Sizes { image: image_size(rows), tpdos: 0, rpdos: 0, watches: 0, scanned: 0 };
+        let (image, services) = (image_size(rows), Services::of(rows));
+        let mut sizes = Sizes { image, tpdos: 0, rpdos: 0, watches: 0, scanned: 0, services };
         let (mut i, mut is_multiplexed) = (0, false);
         while i < rows.len() {
             let row = &rows[i];
@@ -266,6 +289,7 @@ impl Sizes {
                 rpdos: larger(sizes.rpdos, own.rpdos),
                 watches: larger(sizes.watches, own.watches),
                 scanned: larger(sizes.scanned, own.scanned),
+                services: sizes.services.with(own.services),
             };
             i += 1;
         }
@@ -280,11 +304,12 @@ impl Sizes {
             && self.rpdos <= room.rpdos
             && self.watches <= room.watches
             && self.scanned <= room.scanned
+            && room.services.contains(self.services)
     }
 }
 
 /// Whether the number of mapped objects can be 254 or 255.
-const fn can_be_multiplexed(count: &Object) -> bool {
+pub(super) const fn can_be_multiplexed(count: &Object) -> bool {
     let (_, high) = effective_limits(count);
     match count.default {
         _ if count.access.is_writable() => high >= 0xFE,
@@ -315,6 +340,7 @@ macro_rules! device {
             { $sizes.rpdos },
             { $sizes.watches },
             { $sizes.scanned },
+            { $sizes.services.bits() },
         >
     };
     ($application:ty, $rows:expr) => {

@@ -24,7 +24,7 @@ impl Field {
     #[inline]
     pub(crate) fn set_number(self, image: &mut [u8], value: u32, bytes: &[u8]) {
         match self.size {
-            4 => self.store(image, value.to_le_bytes()),
+            4 => self.put(image, value.to_le_bytes()),
             _ => self.set(image, bytes),
         }
     }
@@ -33,8 +33,8 @@ impl Field {
     pub fn set(self, image: &mut [u8], bytes: &[u8]) {
         // The frequent sizes. A copy of fixed size is cheap.
         match (self.size, bytes.first_chunk(), bytes.first_chunk()) {
-            (4, Some(word), _) => return self.store::<4>(image, *word),
-            (8, _, Some(words)) => return self.store::<8>(image, *words),
+            (4, Some(word), _) => return self.put::<4>(image, *word),
+            (8, _, Some(words)) => return self.put::<8>(image, *words),
             _ => (),
         }
         let start = usize::from(self.offset);
@@ -60,47 +60,127 @@ impl Field {
         }
     }
 
-    /// The first `K` bytes from the start of the value.
+    /// The `K` bytes from the start of the value. For a value of another size, some are those of a neighbour.
     #[must_use]
     pub fn load<const K: usize>(self, image: &[u8]) -> [u8; K] {
         image.get(usize::from(self.offset)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; K])
     }
 
-    /// Replaces the first `K` bytes from the start of the value. Like `set`, for a size that is known at compile time.
+    /// Replaces the value, if it has `K` bytes. Otherwise nothing changes: neither a neighbour, nor a part of the value.
+    /// Like `set`, for a size that is known at compile time.
     pub fn store<const K: usize>(self, image: &mut [u8], bytes: [u8; K]) {
+        if usize::from(self.size) == K {
+            self.put(image, bytes);
+        }
+    }
+
+    /// Replaces a value of `K` bytes.
+    fn put<const K: usize>(self, image: &mut [u8], bytes: [u8; K]) {
         if let Some(place) = image.get_mut(usize::from(self.offset)..).and_then(|rest| rest.first_chunk_mut())
         {
             *place = bytes;
         }
     }
 
-    /// The value of an UNSIGNED8.
+    /// The value of an UNSIGNED64, or of an UNSIGNED48.
     #[must_use]
-    pub fn u8(self, image: &[u8]) -> u8 {
-        u8::from_le_bytes(self.load(image))
+    pub fn u64(self, image: &[u8]) -> u64 {
+        match self.size {
+            6 => u64::from_le_bytes(padded(&self.load::<6>(image))),
+            _ => u64::from_le_bytes(self.load(image)),
+        }
     }
 
-    /// The value of an UNSIGNED16.
-    #[must_use]
-    pub fn u16(self, image: &[u8]) -> u16 {
-        u16::from_le_bytes(self.load(image))
+    /// Sets an UNSIGNED64, or an UNSIGNED48 to the lowest 48 bits. A value of another size keeps its bytes.
+    pub fn set_u64(self, image: &mut [u8], value: u64) {
+        if matches!(self.size, 6 | 8) {
+            self.set(image, &value.to_le_bytes());
+        }
     }
+}
 
-    /// The value of an UNSIGNED32.
-    #[must_use]
-    pub fn u32(self, image: &[u8]) -> u32 {
-        u32::from_le_bytes(self.load(image))
-    }
+/// Access to a value of a type with a fixed size.
+macro_rules! access {
+    ($($kind:ident, $set:ident, $name:literal;)+) => {
+        impl Field {
+            $(
+                #[doc = concat!("The value of ", $name, ".")]
+                #[must_use]
+                pub fn $kind(self, image: &[u8]) -> $kind {
+                    $kind::from_le_bytes(self.load(image))
+                }
 
-    /// The value of a REAL32.
-    #[must_use]
-    pub fn f32(self, image: &[u8]) -> f32 {
-        f32::from_le_bytes(self.load(image))
-    }
+                #[doc = concat!("Sets ", $name, ". A value of another size keeps its bytes.")]
+                pub fn $set(self, image: &mut [u8], value: $kind) {
+                    self.store(image, value.to_le_bytes());
+                }
+            )+
+        }
+    };
+}
+
+access! {
+    u8, set_u8, "an UNSIGNED8 or BOOLEAN";
+    i8, set_i8, "an INTEGER8";
+    u16, set_u16, "an UNSIGNED16";
+    i16, set_i16, "an INTEGER16";
+    u32, set_u32, "an UNSIGNED32";
+    i32, set_i32, "an INTEGER32";
+    f32, set_f32, "a REAL32";
 }
 
 /// The last bytes of an image, followed by zeros.
 #[inline(never)]
 fn padded(rest: &[u8]) -> [u8; 8] {
     Bytes::from_slice(rest).padded()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A value of two bytes between two neighbours.
+    const FIELD: Field = Field { offset: 1, size: 2 };
+    const IMAGE: [u8; 6] = [1, 2, 3, 4, 5, 6];
+
+    #[test]
+    fn a_value_of_another_size_is_not_written() {
+        let mut image = IMAGE;
+        FIELD.store(&mut image, [9]);
+        FIELD.store(&mut image, [9; 4]);
+        FIELD.set_u8(&mut image, 9);
+        FIELD.set_i32(&mut image, 9);
+        FIELD.set_u64(&mut image, 9);
+        assert_eq!(image, IMAGE);
+        FIELD.store(&mut image, [8, 9]);
+        assert_eq!((image, FIELD.u16(&image)), ([1, 8, 9, 4, 5, 6], 0x0908));
+    }
+
+    #[test]
+    fn the_last_value_of_an_image_is_written() {
+        let mut image = IMAGE;
+        Field { offset: 5, size: 1 }.set_i8(&mut image, -1);
+        assert_eq!(image, [1, 2, 3, 4, 5, 0xFF]);
+        Field { offset: 5, size: 2 }.set_u16(&mut image, 0);
+        assert_eq!(image, [1, 2, 3, 4, 5, 0xFF], "the image is too short");
+    }
+
+    #[test]
+    fn every_type_reads_what_it_has_written() {
+        let field = |size| Field { offset: 3, size };
+        let mut image = [0; 12];
+        field(1).set_i8(&mut image, -3);
+        assert_eq!((field(1).i8(&image), field(1).u8(&image)), (-3, 0xFD));
+        field(2).set_i16(&mut image, -300);
+        assert_eq!((field(2).i16(&image), field(2).u16(&image)), (-300, 0xFED4));
+        field(4).set_i32(&mut image, -70_000);
+        assert_eq!(field(4).i32(&image), -70_000);
+        field(4).set_f32(&mut image, 1.5);
+        assert_eq!(field(4).f32(&image).to_bits(), 1.5_f32.to_bits());
+        field(8).set_u64(&mut image, u64::MAX - 1);
+        assert_eq!(field(8).u64(&image), u64::MAX - 1);
+        field(6).set_u64(&mut image, 0x0102_0304_0506_0708);
+        assert_eq!(field(6).u64(&image), 0x0304_0506_0708);
+        assert_eq!((image[2], image[9]), (0, 0xFF), "the neighbours keep their values");
+    }
 }

@@ -9,14 +9,17 @@
 
 mod builder;
 mod check;
+mod check_pdos;
 mod compile;
 mod entry;
+mod fail;
 mod field;
 mod group;
 mod limits;
 mod object;
 mod packed;
 mod rule;
+mod services;
 mod tables;
 mod types;
 
@@ -24,10 +27,12 @@ pub use check::check;
 pub use compile::{Counts, Sizes, compile, count, gather, image_size};
 pub use entry::Entry;
 pub(crate) use entry::little_endian;
+pub(crate) use fail::fail;
 pub use field::Field;
 pub use group::{Group, Groups};
 pub use object::{Access, DefaultValue, Mapping, Object};
-pub use packed::{BufferFull, packed_size};
+pub use packed::{BufferFull, is_packed, packed_size};
 pub use rule::Rule;
+pub use services::Services;
 pub use tables::{Dictionary, Entries, Tables};
 pub use types::Type;

@@ -61,7 +61,7 @@ impl Mapping {
 pub enum DefaultValue {
     /// The default of an entry of integer type.
     Integer(i64),
-    /// The default of an entry of type REAL32.
+    /// The default of an entry of type REAL32, a finite number.
     Real(f32),
     /// The default of an entry of type `VISIBLE_STRING`.
     Text(&'static str),
@@ -96,6 +96,8 @@ pub struct Object {
     pub unit: &'static str,
     /// The behaviour of the entry beyond holding a value.
     pub rule: Rule,
+    /// A write makes the device act, although the value is stored: a preset, for example.
+    pub acts: bool,
 }
 
 impl Object {
@@ -109,7 +111,20 @@ impl Object {
             _ => DefaultValue::Integer(0),
         };
         let (mapping, group, rule) = (Mapping::No, None, Rule::of(index, sub));
-        Object { index, sub, name, kind, access, mapping, limits: None, default, group, unit: "", rule }
+        Object {
+            index,
+            sub,
+            name,
+            kind,
+            access,
+            mapping,
+            limits: None,
+            default,
+            group,
+            unit: "",
+            rule,
+            acts: false,
+        }
     }
 
     /// Sub-index 0 of a record or an array: the highest sub-index.
@@ -131,7 +146,7 @@ impl Object {
         self.default(DefaultValue::Integer(value))
     }
 
-    /// Sets a REAL32 default value.
+    /// Sets a REAL32 default value, a finite number.
     #[must_use]
     pub const fn real(self, value: f32) -> Object {
         self.default(DefaultValue::Real(value))
@@ -149,6 +164,43 @@ impl Object {
     pub const fn stored(mut self, group: Group) -> Object {
         self.group = Some(group);
         self
+    }
+
+    /// Excludes a stored entry from the configuration, because a write makes the device act
+    /// ([`is_configuration`](Object::is_configuration)).
+    ///
+    /// # Panics
+    /// During compilation, for an entry that is not stored: it is no part of the configuration in any case.
+    #[must_use]
+    pub const fn acts(mut self) -> Object {
+        assert!(self.group.is_some(), "only a stored entry can be excluded from the configuration");
+        self.acts = true;
+        self
+    }
+
+    /// Whether the entry is a parameter that a master writes with a stored configuration (CiA 306, `ObjFlags`): a
+    /// parameter that the device stores with 1010h and that does not make the device act. The calibration belongs to
+    /// the device itself.
+    #[must_use]
+    pub const fn is_configuration(&self) -> bool {
+        let is_stored = matches!(self.group, Some(Group::Communication | Group::Application));
+        is_stored && matches!(self.access, Access::ReadWrite) && !self.acts
+    }
+
+    /// Whether an upload of the entry is of no use to a master that reads the configuration: a domain, an entry that is
+    /// empty most of the time, or a command that cannot be read.
+    #[must_use]
+    pub const fn is_skipped_by_scans(&self) -> bool {
+        let is_readable = self.access.is_readable();
+        !is_readable || matches!(self.kind, Type::Domain) || matches!(self.rule, Rule::ErrorEntry)
+    }
+
+    /// `ObjFlags` of the entry (CiA 306): bit 0 refuses a write when a configuration is downloaded, bit 1 refuses a
+    /// read when the device is scanned.
+    #[must_use]
+    pub const fn flags(&self) -> u8 {
+        let refuses_write = self.access.is_writable() && !self.is_configuration();
+        refuses_write as u8 | (self.is_skipped_by_scans() as u8) << 1
     }
 
     /// Makes the entry mappable.

@@ -8,6 +8,10 @@
 //! └─────────┴─────┴───────┴──────┴───────────┘
 //! ```
 //!
+//! A COB-ID with the pre-defined CAN-ID of the node follows the node-ID. It is stored with bit 29 set, which no COB-ID of
+//! a base frame has, and without the node-ID; if its flags have their defaults, it is left out. Any other COB-ID is
+//! stored as a number.
+//!
 //! Every value has its index, so a set that an older firmware has stored fits a newer dictionary: new objects keep
 //! their defaults. A set is refused as a whole if one of its objects no longer exists, has another size or does not
 //! accept the value.
@@ -20,6 +24,11 @@ use crate::sdo::Abort;
 
 /// Size of the head of a run in bytes.
 const HEAD: usize = 5;
+
+/// Mark of a stored COB-ID that follows the node-ID: bit 29, extended frame.
+const FOLLOWS: u32 = 1 << 29;
+/// The flags of a COB-ID, bits 30 and 31.
+const FLAGS: u32 = 0b11 << 30;
 
 /// The buffer had no room for all values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,9 +67,21 @@ const fn is_next(a: &Object, b: &Object) -> bool {
     follows && !matches!(a.default, DefaultValue::NodeId(_)) && !matches!(b.default, DefaultValue::NodeId(_))
 }
 
+/// Whether a packed group has a value for an entry. An older firmware may not have had the entry.
+#[must_use]
+pub fn is_packed(mut packed: &[u8], index: u16, sub: u8) -> bool {
+    while let Some((run, rest)) = Run::parse(packed) {
+        if run.index == index && usize::from(sub.wrapping_sub(run.sub)) * run.size < run.bytes.len() {
+            return true;
+        }
+        packed = rest;
+    }
+    false
+}
+
 impl Dictionary {
-    /// Writes the values of a group to the beginning of `out`. Returns the number of bytes. A COB-ID that is equal to
-    /// the default for this node-ID is left out, so that it still follows the node-ID.
+    /// Writes the values of a group to the beginning of `out`. Returns the number of bytes. A COB-ID with the
+    /// pre-defined CAN-ID of this node-ID follows the node-ID with which it is loaded.
     ///
     /// # Errors
     /// `BufferFull`; the content of `out` is then useless.
@@ -72,7 +93,8 @@ impl Dictionary {
         out: &mut [u8],
     ) -> Result<usize, BufferFull> {
         let is_kept = |entry: &Entry| {
-            entry.attributes.group == Some(group) && !self.follows_node_id(entry, node_id, image)
+            let is_default = || entry.field.u32(image) == self.default_number(entry, node_id);
+            entry.attributes.group == Some(group) && !(entry.attributes.node_relative && is_default())
         };
         let mut writer = Writer { out, len: 0 };
         let mut last: Option<(Entry, usize)> = None;
@@ -86,22 +108,35 @@ impl Dictionary {
             if let Some(count) = writer.out.get_mut(head + 3) {
                 *count = count.wrapping_add(1);
             }
-            writer.append(entry.field.get(image))?;
+            match self.relative(&entry, node_id, image) {
+                Some(relative) => writer.append(&relative.to_le_bytes())?,
+                None => writer.append(entry.field.get(image))?,
+            }
             last = Some((entry, head));
         }
         Ok(writer.len)
     }
 
-    /// Writes the values of a packed group to the image.
+    /// Writes the values of a packed group to the image of a node with this node-ID.
     ///
     /// # Errors
     /// The reason why the set does not fit this dictionary. The image then contains a part of the set and must be
     /// loaded again.
-    pub(crate) fn unpack(&self, group: Group, mut packed: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    pub(crate) fn unpack(
+        &self,
+        group: Group,
+        node_id: Option<NodeId>,
+        mut packed: &[u8],
+        image: &mut [u8],
+    ) -> Result<(), Abort> {
         while !packed.is_empty() {
             let (run, rest) = Run::parse(packed).ok_or(Abort::General)?;
             for (sub, value) in run.values() {
-                self.unpack_value(group, run.index, sub, value, image)?;
+                let entry = self.find(run.index, sub)?;
+                if entry.attributes.group != Some(group) {
+                    return Err(Abort::Length);
+                }
+                self.unpack_value(&entry, node_id, value, image)?;
             }
             packed = rest;
         }
@@ -110,23 +145,31 @@ impl Dictionary {
 
     fn unpack_value(
         &self,
-        group: Group,
-        index: u16,
-        sub: u8,
+        entry: &Entry,
+        node_id: Option<NodeId>,
         value: &[u8],
         image: &mut [u8],
     ) -> Result<(), Abort> {
-        let entry = self.find(index, sub)?;
-        if entry.attributes.group != Some(group) || value.len() != usize::from(entry.field.size) {
+        if value.len() != usize::from(entry.field.size) {
             return Err(Abort::Length);
         }
-        entry.check_value(little_endian(value))?;
-        entry.field.set(image, value);
+        let number = little_endian(value);
+        entry.check_value(number)?;
+        if entry.attributes.node_relative && number & FOLLOWS != 0 {
+            let id = self.default_number(entry, node_id) & !FLAGS;
+            entry.field.store(image, (id | number & FLAGS).to_le_bytes());
+        } else {
+            entry.field.set(image, value);
+        }
         Ok(())
     }
 
-    fn follows_node_id(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> bool {
-        entry.attributes.node_relative && entry.field.u32(image) == self.default_number(entry, node_id)
+    /// The stored form of a COB-ID that follows the node-ID; `None` for any other value.
+    fn relative(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> Option<u32> {
+        let value = entry.field.u32(image);
+        let follows =
+            entry.attributes.node_relative && (value ^ self.default_number(entry, node_id)) & !FLAGS == 0;
+        follows.then(|| value & FLAGS | FOLLOWS | self.default_number(entry, None) & !FLAGS)
     }
 }
 

@@ -3,6 +3,7 @@
 /// The effect of an entry beyond storing a value. The rules of CiA 301 follow from index and sub-index, so no row can
 /// lack its rule. The methods of [`Object`](super::Object) set the other rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Rule {
     /// The entry only stores a value.
     Plain,

@@ -14,6 +14,7 @@
 //! once. All dictionaries that are compiled together share these tables.
 
 use super::entry::{Attributes, little_endian};
+use super::fail::fail;
 use super::{Entry, Field};
 use crate::NodeId;
 use crate::copy::copy;
@@ -191,15 +192,22 @@ impl Dictionary {
     #[must_use]
     pub const fn field(&self, index: u16, sub: u8) -> Field {
         let mut i = 0;
-        while index < self.series[i].index || index - self.series[i].index >= self.series[i].objects as u16 {
+        while i < self.series.len()
+            && (index < self.series[i].index || index - self.series[i].index >= self.series[i].objects as u16)
+        {
             i += 1;
         }
+        if i == self.series.len() {
+            fail(index, sub, "no such object in the dictionary");
+        }
         let series = &self.series[i];
-        let mut place = series.first as usize;
-        while self.places[place].sub != sub {
+        let (mut place, end) = (series.first as usize, series.first as usize + series.entries as usize);
+        while place < end && self.places[place].sub != sub {
             place += 1;
         }
-        assert!(place < series.first as usize + series.entries as usize, "no such entry");
+        if place == end {
+            fail(index, sub, "no such sub-index in the dictionary");
+        }
         let Place { offset, attributes, .. } = self.places[place];
         let size = self.attributes[attributes as usize].kind.size();
         let object = series.offset + (index - series.index) * self.stride(series);

@@ -2,6 +2,7 @@
 
 /// A data type that an entry can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Type {
     /// BOOLEAN, a byte of 0 or 1. A PDO carries it as eight bits.
     Boolean,
@@ -21,7 +22,9 @@ pub enum Type {
     Unsigned48,
     /// UNSIGNED64; the default value can have at most 63 bits.
     Unsigned64,
-    /// REAL32
+    /// REAL32, a finite number. Infinities and NaN are refused: as a default they do not compile, a download gets the
+    /// abort code 0609 0030h, a PDO leaves them out, and stored values with them count as damaged. The application may
+    /// write them to the image, for example to mark a measured value as invalid; they are sent as they are.
     Real32,
     /// `VISIBLE_STRING` of at most this many characters.
     VisibleString(u8),
@@ -78,5 +81,26 @@ impl Type {
             Type::Unsigned64 => Some((0, i64::MAX)),
             Type::Real32 | Type::VisibleString(_) | Type::Domain => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_range_of_an_integer_follows_from_its_size() {
+        let unsigned = [Type::Unsigned8, Type::Unsigned16, Type::Unsigned32, Type::Unsigned48];
+        let signed = [Type::Integer8, Type::Integer16, Type::Integer32];
+        for kind in unsigned {
+            assert_eq!(kind.range(), Some((0, (1_i64 << (kind.size() * 8)) - 1)), "{kind:?}");
+        }
+        for kind in signed {
+            let half = 1_i64 << (kind.size() * 8 - 1);
+            assert_eq!(kind.range(), Some((-half, half - 1)), "{kind:?}");
+        }
+        assert_eq!(Type::Unsigned48.range(), Some((0, 0xFFFF_FFFF_FFFF)));
+        assert_eq!(Type::Unsigned64.range(), Some((0, i64::MAX)));
+        assert_eq!(Type::Boolean.range(), Some((0, 1)));
     }
 }

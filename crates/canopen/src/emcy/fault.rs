@@ -1,5 +1,6 @@
 //! Faults: communication faults, which the device detects itself, and faults of the application.
 
+use crate::ErrorClass;
 use crate::dictionary::Group;
 
 /// A fault that the device signals by EMCY.
@@ -20,12 +21,11 @@ pub enum Fault {
     MpdoNotTaken,
     /// The heartbeat of a node is missing (8130h). The number is the entry of 1016h, from 0.
     Heartbeat(u8),
-    /// An RPDO was shorter than its mapping and is not processed (8210h). The number is the rank of the RPDO among
-    /// those of the dictionary, from 0.
+    /// The RPDO with this number, 1 to 512, was shorter than its mapping and is not processed (8210h).
     RpdoTooShort(u16),
-    /// An RPDO, numbered the same way, was longer than its mapping (8220h).
+    /// The RPDO with this number was longer than its mapping (8220h).
     RpdoTooLong(u16),
-    /// An RPDO, numbered the same way, has not arrived in time (8250h).
+    /// The RPDO with this number has not arrived in time (8250h).
     RpdoDeadline(u16),
     /// The stored values of a group could not be loaded, so the defaults are in use (6302h communication, 6303h
     /// application, 6300h calibration; the first byte of the error field is 2).
@@ -37,7 +37,7 @@ pub enum Fault {
     Application(u8),
 }
 
-/// A fault of the application: its codes in EMCY and error register.
+/// A fault as EMCY, error register and object 1029h treat it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Condition {
@@ -47,13 +47,23 @@ pub struct Condition {
     pub register: u8,
     /// Manufacturer-specific error field of the EMCY.
     pub detail: [u8; 5],
+    /// The sub-index of object 1029h that applies to the fault; `None` for a fault that never changes the NMT state.
+    pub class: Option<ErrorClass>,
 }
 
 impl Condition {
-    /// A condition with this error code. In the error register, the condition sets the generic error only.
+    /// A condition with this error code. The condition sets the generic error only in the error register, and does not
+    /// change the NMT state.
     #[must_use]
     pub const fn new(code: u16) -> Condition {
-        Condition { code, register: 0, detail: [0; 5] }
+        Condition { code, register: 0, detail: [0; 5], class: None }
+    }
+
+    /// Applies a sub-index of object 1029h to the condition.
+    #[must_use]
+    pub const fn of_class(mut self, class: ErrorClass) -> Condition {
+        self.class = Some(class);
+        self
     }
 }
 
@@ -99,9 +109,9 @@ impl Fault {
         }
     }
 
-    /// The codes of the fault in EMCY and error register. For a heartbeat or an RPDO, the first two bytes of the error
-    /// field are its number, from 1. For stored data, the first byte tells which values are in use. `conditions` are
-    /// the conditions of the application.
+    /// The codes of the fault in EMCY and error register. For a heartbeat, the first two bytes of the error field are
+    /// the sub-index of 1016h; for an RPDO, its number. For stored data, the first byte gives the values in use.
+    /// `conditions` are the conditions of the application.
     #[must_use]
     pub fn condition(self, conditions: &[Condition]) -> Condition {
         let code = match self {
@@ -125,20 +135,22 @@ impl Fault {
             }
         };
         let [low, high] = self.detail().to_le_bytes();
-        let register = if code >> 8 == 0x63 { 0 } else { COMMUNICATION };
-        Condition { code, register, detail: [low, high, 0, 0, 0] }
+        let (register, class) = match self {
+            Fault::StoredData(_) | Fault::OlderData(_) => (0, Some(ErrorClass::DEVICE)),
+            Fault::Heartbeat(_) => (COMMUNICATION, Some(ErrorClass::COMMUNICATION)),
+            _ => (COMMUNICATION, None),
+        };
+        Condition { code, register, detail: [low, high, 0, 0, 0], class }
     }
 
-    /// The start of the error field: the number of a heartbeat or an RPDO, from 1; for stored data, the values in use;
-    /// 0 for other faults.
+    /// The start of the error field: the sub-index of a heartbeat, the number of an RPDO; for stored data, the values
+    /// in use; 0 for other faults.
     const fn detail(self) -> u16 {
         match self {
             Fault::OlderData(_) => OLDER_HOLDS,
             Fault::StoredData(_) => DEFAULTS_HOLD,
             Fault::Heartbeat(number) => number as u16 + 1,
-            Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => {
-                number.saturating_add(1)
-            }
+            Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => number,
             _ => 0,
         }
     }
@@ -184,9 +196,13 @@ impl FaultSet {
 
     /// The active faults, without those of heartbeats and RPDOs.
     pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
-        let single = (0..).zip(Fault::SINGLE).filter(move |(bit, _)| self.single & 1 << bit != 0);
-        let application = (0..32).filter(move |number| self.application & application_bit(*number) != 0);
-        single.map(|(_, fault): (u16, Fault)| fault).chain(application.map(Fault::Application))
+        (0..Fault::SINGLE.len() + 32).filter_map(move |place| {
+            if let Some(fault) = Fault::SINGLE.get(place) {
+                return (self.single & 1 << place != 0).then_some(*fault);
+            }
+            let number = u8::try_from(place - Fault::SINGLE.len()).unwrap_or(u8::MAX);
+            (self.application & application_bit(number) != 0).then_some(Fault::Application(number))
+        })
     }
 
     /// The value of the error register (1001h).
@@ -223,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_register_tells_communication_from_the_rest() {
-        let conditions = [Condition { code: 0x3110, register: 0b100, detail: [0; 5] }];
+        let conditions = [Condition { register: 0b100, ..Condition::new(0x3110) }];
         let of = |fault| {
             let mut set = FaultSet::default();
             set.insert(fault);
@@ -232,14 +248,14 @@ mod tests {
         assert_eq!(FaultSet::default().register(&conditions), 0);
         assert_eq!(of(Fault::Application(0)), 0b101);
         assert_eq!(of(Fault::StoredData(Group::Application)), 0x01);
-        for fault in [Fault::Overrun, Fault::MpdoNotTaken, Fault::Heartbeat(126), Fault::RpdoDeadline(511)] {
+        for fault in [Fault::Overrun, Fault::MpdoNotTaken, Fault::Heartbeat(126), Fault::RpdoDeadline(512)] {
             assert_eq!(of(fault), 0x11, "{fault:?}");
         }
     }
 
     #[test]
     fn one_of_many_is_named_by_two_bytes() {
-        let condition = Fault::RpdoTooShort(511).condition(&[]);
+        let condition = Fault::RpdoTooShort(512).condition(&[]);
         assert_eq!((condition.code, condition.detail), (0x8210, [0x00, 0x02, 0, 0, 0]));
         assert_eq!(Fault::Heartbeat(0).condition(&[]).detail, [1, 0, 0, 0, 0]);
     }

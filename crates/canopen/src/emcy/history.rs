@@ -18,11 +18,11 @@ impl History {
     }
 
     pub(crate) fn push(&mut self, code: u16) {
-        self.newest = (self.newest + 1) % DEPTH;
+        self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.errors.get_mut(usize::from(self.newest)) {
             *place = u32::from(code).to_le_bytes();
         }
-        self.count = self.count.saturating_add(1).min(DEPTH);
+        self.count = (self.count + 1).min(DEPTH);
     }
 
     pub(crate) fn clear(&mut self) {

@@ -1,10 +1,10 @@
-//! The EMCY producer: keeps the set of active faults and sends their changes.
+//! The EMCY producer: keeps the set of active faults, sends their changes, and keeps the list of the errors sent.
 
 use super::history::History;
 use super::{Condition, Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::{Context, RETRY};
-use crate::{CobId, Duration, Frame, Instant, Transmit};
+use crate::{CobId, Duration, ErrorClass, Frame, Instant, Transmit};
 use heapless::Deque;
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
@@ -28,9 +28,11 @@ pub(crate) struct Producer {
     waiting: Deque<Message, WAITING>,
     /// 1015h, in 100 us.
     inhibit: u16,
-    /// The end of the inhibit time after the last message.
-    inhibited_until: Instant,
+    /// When the last message was sent, or `NEVER`.
+    sent_at: Instant,
     due: Instant,
+    /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_error`].
+    errors: u8,
 }
 
 impl Producer {
@@ -43,29 +45,51 @@ impl Producer {
             history: History::new(),
             waiting: Deque::new(),
             inhibit: 0,
-            inhibited_until: Instant(0),
+            sent_at: Instant::NEVER,
             due: Instant::NEVER,
+            errors: 0,
         }
     }
 
-    /// Takes the COB-ID of 1014h. Bit 31 disables EMCY.
-    pub(crate) fn configure(&mut self, value: u32) {
-        self.id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+    /// Takes the COB-ID of 1014h. Bit 31 disables EMCY. Returns whether this value switches EMCY on.
+    pub(crate) fn configure(&mut self, value: u32) -> bool {
+        let id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+        let was_on = core::mem::replace(&mut self.id, id).is_some();
+        id.is_some() && !was_on
     }
 
-    /// Takes the inhibit time of 1015h, from the next message on.
-    pub(crate) fn set_inhibit(&mut self, inhibit: u16) {
+    /// Takes the inhibit time of 1015h. It applies to a waiting message, too.
+    pub(crate) fn set_inhibit(&mut self, inhibit: u16, now: Instant) {
         self.inhibit = inhibit;
+        if !self.is_idle() {
+            self.due = self.next_due(now);
+        }
+    }
+
+    /// When the next message may be sent.
+    #[inline(never)]
+    fn next_due(&self, now: Instant) -> Instant {
+        match self.sent_at {
+            Instant::NEVER => now,
+            sent => sent.plus(Duration::from_inhibit(self.inhibit)).max(now),
+        }
     }
 
     /// After a reset: clears the history, and reports the faults that are still active again.
     pub(crate) fn restart(&mut self, now: Instant) {
         self.history.clear();
-        self.waiting.clear();
-        self.due = Instant::NEVER;
+        self.forget_waiting();
+        self.errors = 0;
         let active = core::mem::take(&mut self.active);
-        for fault in active.singles() {
-            self.raise(fault, now);
+        self.raise_singles(active, now);
+    }
+
+    // Not inlined: two callers, and much code.
+    #[inline(never)]
+    fn raise_singles(&mut self, faults: FaultSet, now: Instant) {
+        for fault in faults.singles() {
+            self.active.insert(fault);
+            self.errors |= self.repeat(fault, now);
         }
     }
 
@@ -73,11 +97,70 @@ impl Producer {
     pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
-            let Condition { code, detail, .. } = fault.condition(self.conditions);
-            self.history.push(code);
-            self.report(code, detail, now);
+            self.errors |= self.repeat(fault, now);
         }
         is_new
+    }
+
+    /// As [`Producer::raise`], for a device without EMCY: no message waits.
+    pub(crate) fn raise_silently(&mut self, fault: Fault) -> bool {
+        let is_new = self.active.insert(fault);
+        if is_new {
+            self.errors |= fault.condition(self.conditions).class.map_or(0, error_bit);
+        }
+        is_new
+    }
+
+    /// As [`Producer::clear`], for a device without EMCY.
+    pub(crate) fn clear_silently(&mut self, fault: Fault) -> bool {
+        self.active.remove(fault)
+    }
+
+    /// As [`Producer::restart`], for a device without EMCY.
+    pub(crate) fn restart_silently(&mut self) {
+        self.errors = 0;
+        let active = core::mem::take(&mut self.active);
+        for fault in active.singles() {
+            self.raise_silently(fault);
+        }
+    }
+
+    /// Reports an active fault, and returns the bit of its class.
+    #[inline(never)]
+    pub(crate) fn repeat(&mut self, fault: Fault, now: Instant) -> u8 {
+        let Condition { code, detail, class, .. } = fault.condition(self.conditions);
+        self.report(code, detail, now);
+        class.map_or(0, error_bit)
+    }
+
+    /// Reports the active faults again, without those of heartbeats and RPDOs. They are no new errors.
+    pub(crate) fn repeat_singles(&mut self, now: Instant) {
+        let errors = self.errors;
+        self.raise_singles(self.active, now);
+        self.errors = errors;
+    }
+
+    /// Object 1029h is to be applied for an error of this class.
+    pub(crate) fn add_error(&mut self, class: ErrorClass) {
+        self.errors |= error_bit(class);
+    }
+
+    /// The class of an error that has occurred since the last call, if there is one.
+    pub(crate) fn take_error(&mut self) -> Option<ErrorClass> {
+        let lowest = self.errors.trailing_zeros();
+        self.errors &= self.errors.saturating_sub(1);
+        u8::try_from(lowest).ok().filter(|sub| *sub < 8).map(ErrorClass)
+    }
+
+    /// Discards the waiting messages.
+    pub(crate) fn forget_waiting(&mut self) {
+        self.waiting.clear();
+        self.due = Instant::NEVER;
+    }
+
+    /// Whether no message waits.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.waiting.is_empty()
     }
 
     /// Clears a fault. Returns whether the fault was active. After the last active fault, code 0000h is sent.
@@ -98,7 +181,7 @@ impl Producer {
         {
             *newest = message;
         }
-        self.due = self.due.min(self.inhibited_until.max(now));
+        self.due = self.due.min(self.next_due(now));
     }
 
     /// The error register, object 1001h.
@@ -125,20 +208,19 @@ impl Producer {
         if context.now < self.due {
             return;
         }
-        let Some(cob_id) = self.id else {
-            self.waiting.clear();
-            self.due = Instant::NEVER;
-            return;
-        };
+        let Some(cob_id) = self.id else { return self.forget_waiting() };
         while let Some(message) = self.waiting.front() {
             if !context.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
-                self.due = context.now + RETRY;
+                self.due = context.now.plus(RETRY);
                 return;
             }
+            if message.code != 0 {
+                self.history.push(message.code);
+            }
             let _ = self.waiting.pop_front();
-            if self.inhibit != 0 {
-                self.inhibited_until = context.now + Duration::from_inhibit(self.inhibit);
-                self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
+            self.sent_at = context.now;
+            if self.inhibit != 0 && !self.waiting.is_empty() {
+                self.due = self.next_due(context.now);
                 return;
             }
         }
@@ -146,11 +228,16 @@ impl Producer {
     }
 }
 
-/// Checks a new value of 1014h: the CAN-ID must be configurable, and can change only while EMCY is disabled (bit 31).
+/// The bit of a class in a set of eight; 0 for a class beyond them.
+fn error_bit(ErrorClass(sub): ErrorClass) -> u8 {
+    1_u8.checked_shl(sub.into()).unwrap_or(0)
+}
+
+/// Checks a new value of 1014h: the CAN-ID can change only while EMCY is disabled (bit 31). EMCY that is enabled needs a
+/// configurable CAN-ID.
 pub(crate) fn check_cob_id(old: u32, new: u32) -> Result<(), Abort> {
     let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
     let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
-    let stays = !old.bit31 && !new.bit31;
-    let moves = stays && old.id != new.id;
-    if moves || new.id.is_restricted() { Err(Abort::InvalidValue) } else { Ok(()) }
+    let moves = !old.bit31 && old.id != new.id;
+    if !new.bit31 && (moves || new.id.is_restricted()) { Err(Abort::InvalidValue) } else { Ok(()) }
 }

@@ -76,11 +76,16 @@ impl<const W: usize> Consumer<W> {
         }
         for (number, entry) in (0..).zip(&mut self.entries) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
-                entry.due = now + Duration::from_millis(watch.period.into());
+                entry.due = now.plus(Duration::from_millis(watch.period.into()));
                 return core::mem::take(&mut entry.is_lost).then_some(Change::Back(number));
             }
         }
         None
+    }
+
+    /// The entries whose heartbeat is lost, from 0.
+    pub(crate) fn lost(&self) -> impl Iterator<Item = u8> {
+        (0..).zip(&self.entries).filter(|(_, entry)| entry.is_lost).map(|(number, _)| number)
     }
 
     /// The next instant at which a heartbeat is missing.

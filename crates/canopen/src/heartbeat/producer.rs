@@ -31,9 +31,23 @@ impl Producer {
         }
     }
 
+    /// Whether the boot-up message has not been sent yet.
+    pub(crate) fn boots_up(&self) -> bool {
+        self.boot_up
+    }
+
     /// When the next message is due.
     pub(crate) fn due(&self) -> Instant {
         self.due
+    }
+
+    /// The latest instant at which a consumer with a time of 1.5 periods still expects the next heartbeat.
+    pub(crate) fn latest(&self) -> Instant {
+        match self.due {
+            _ if self.boot_up => Instant(0),
+            Instant::NEVER => Instant::NEVER,
+            due => due.plus(Duration::from_millis(u64::from(self.period) / 2)),
+        }
     }
 
     /// Sends the boot-up message or the heartbeat, if it is due.
@@ -48,20 +62,10 @@ impl Producer {
             context.send_state(message(state))
         };
         if !sent {
-            self.due = context.now + RETRY;
+            self.due = context.now.plus(RETRY);
             return;
         }
         self.boot_up = false;
-        self.due = self.following(context.now);
-    }
-
-    /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
-    fn following(&self, now: Instant) -> Instant {
-        if self.period == 0 {
-            return Instant::NEVER;
-        }
-        let period = Duration::from_millis(self.period.into());
-        let next = self.due + period;
-        if next > now { next } else { now + period }
+        self.due = self.due.following(self.period, context.now);
     }
 }

@@ -1,7 +1,7 @@
 //! The rows of PDOs: whole PDOs, and single rows for PDOs with other properties.
 
 use super::{list, parameter};
-use crate::dictionary::{DefaultValue, Object, Type};
+use crate::dictionary::{DefaultValue, Object, Rule, Type, fail};
 use crate::pdo::MappedObject;
 
 /// The default COB-ID of PDO `number`, from 1. `base` is 180h for a TPDO and 200h for an RPDO. The PDOs 1 to 4 have a
@@ -45,11 +45,31 @@ pub const fn sync_start(index: u16) -> Object {
     parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
 }
 
-/// The number of mapped objects. The row has no limit: 254 and 255 make the PDO a multiplexed one, and the rule of the
-/// entry checks the number against the mapping entries.
+/// The number of mapped objects, at most eight. The rule of the entry checks the number against the mapping entries.
+/// [`multiplexed`] allows 254 and 255 as well.
 #[must_use]
 pub const fn count(index: u16, name: &'static str, used: i64) -> Object {
-    parameter(index, 0, name, Type::Unsigned8).value(used)
+    let row = parameter(index, 0, name, Type::Unsigned8).value(used);
+    if used > 8 { row } else { row.limits(0, 8) }
+}
+
+/// Allows a PDO to be a multiplexed one: its number of mapped objects can be 254 or 255 (CiA 301, 7.2.2.6). Takes the
+/// rows of PDOs or of mapping parameters. A device links multiplexed PDOs only if one of its PDOs allows them.
+///
+/// ```
+/// use canopen::objects;
+/// const ROWS: [canopen::dictionary::Object; 15] = objects::multiplexed(objects::tpdo(2, &[]));
+/// ```
+#[must_use]
+pub const fn multiplexed<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
+    let mut i = 0;
+    while i < N {
+        if matches!(rows[i].rule, Rule::PdoCount) {
+            rows[i].limits = None;
+        }
+        i += 1;
+    }
+    rows
 }
 
 /// A mapped object: index, sub-index and length in bits.
@@ -64,7 +84,9 @@ pub const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
 /// During compilation, for more than eight objects.
 #[must_use]
 pub const fn mapping(index: u16, name: &'static str, mapped: &[i64]) -> [Object; 9] {
-    assert!(mapped.len() <= 8, "a PDO has eight places");
+    if mapped.len() > 8 {
+        fail(index, 0, "a PDO of these functions maps at most eight objects");
+    }
     let mut rows: [Object; 9] = list(count(index, name, mapped.len() as i64), slot(index, 1, 0));
     let mut i = 0;
     while i < mapped.len() {
@@ -125,18 +147,24 @@ pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
 
 /// A mapping parameter for `objects`, which must be mappable in this direction.
 const fn mapping_of(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
-    assert!(objects.len() <= 8, "a PDO has eight places");
+    if objects.len() > 8 {
+        fail(index, 0, "a PDO of these functions maps at most eight objects");
+    }
     let (mut i, mut len, mut mapped) = (0, 0, [0; 8]);
     while i < objects.len() {
-        let (object, mapping) = (&objects[i], objects[i].mapping);
-        assert!(!is_sent || mapping.allows_tpdo(), "an object cannot be mapped into a TPDO");
-        assert!(is_sent || mapping.allows_rpdo(), "an object cannot be mapped into an RPDO");
+        let object = &objects[i];
+        let allows = if is_sent { object.mapping.allows_tpdo() } else { object.mapping.allows_rpdo() };
+        if !allows {
+            fail(object.index, object.sub, "the object cannot be mapped in this direction");
+        }
         len += object.kind.size();
         let object = MappedObject { index: object.index, sub: object.sub, bits: object.kind.size() * 8 };
         mapped[i] = object.encode() as i64;
         i += 1;
     }
-    assert!(len <= 8, "the objects are longer than a PDO");
+    if len > 8 {
+        fail(index, 0, "the mapped objects have more than eight bytes");
+    }
     mapping(index, name, mapped.split_at(objects.len()).0)
 }
 

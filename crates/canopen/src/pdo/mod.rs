@@ -1,5 +1,6 @@
 //! PDO: process data, mapped from and to the dictionary (CiA 301, 7.2.2).
 
+mod budget;
 mod links;
 mod mapping;
 mod multiplexed;
@@ -8,6 +9,7 @@ mod scanner;
 mod tpdo;
 mod transmission;
 
+pub(crate) use budget::Budget;
 pub(crate) use links::{Chain, Links};
 pub use mapping::MappedObject;
 pub(crate) use mapping::{Content, Direction, Layout, locate};

@@ -4,6 +4,7 @@
 //! frame must arrive before the timer elapses.
 
 use super::{Addressing, Content, Layout, Links, Transmission};
+use crate::emcy::Fault;
 use crate::{CanId, Duration, Frame, Instant};
 
 /// Settings of a valid RPDO, from the objects 1400h.. and 1600h.. .
@@ -67,6 +68,10 @@ pub(crate) enum RpdoFault {
     TooShort,
     TooLong,
     Deadline,
+}
+
+impl RpdoFault {
+    pub(crate) const ALL: [RpdoFault; 3] = [RpdoFault::TooShort, RpdoFault::TooLong, RpdoFault::Deadline];
 }
 
 /// An RPDO. Only valid RPDOs are in the chains.
@@ -142,7 +147,7 @@ impl Rpdo {
         }
         self.due = match settings.deadline {
             0 => Instant::NEVER,
-            deadline => now + Duration::from_millis(deadline.into()),
+            deadline => now.plus(Duration::from_millis(deadline.into())),
         };
         let reception = if frame.len() == mapped { Reception::Complete } else { Reception::TooLong };
         match (&settings.content, settings.is_synchronous) {
@@ -175,6 +180,28 @@ impl Rpdo {
         let (before, bit) = (self.faults, 1 << kind as u8);
         self.faults = if active { before | bit } else { before & !bit };
         self.faults != before
+    }
+
+    /// The number of the RPDO, 1 to 512.
+    pub(crate) fn number(&self) -> u16 {
+        (self.index & 0x1FF) + 1
+    }
+
+    /// A fault of this RPDO.
+    pub(crate) fn fault(&self, kind: RpdoFault) -> Fault {
+        match kind {
+            RpdoFault::TooShort => Fault::RpdoTooShort(self.number()),
+            RpdoFault::TooLong => Fault::RpdoTooLong(self.number()),
+            RpdoFault::Deadline => Fault::RpdoDeadline(self.number()),
+        }
+    }
+
+    /// The active faults.
+    pub(crate) fn active(&self) -> impl Iterator<Item = Fault> {
+        RpdoFault::ALL
+            .into_iter()
+            .filter(|kind| self.faults & 1 << *kind as u8 != 0)
+            .map(|kind| self.fault(kind))
     }
 
     /// Whether any fault is active.

@@ -8,7 +8,7 @@
 use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
 use crate::sdo::Multiplexer;
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{ProcessContext, RETRY};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
@@ -69,6 +69,8 @@ pub(crate) struct Scanner<const M: usize> {
     /// Whether any object waits to be sent.
     is_pending: bool,
     event_due: Instant,
+    /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
+    sent: Instant,
     inhibited_until: Instant,
 }
 
@@ -79,6 +81,7 @@ impl<const M: usize> Scanner<M> {
             watched: Vec::new(),
             is_pending: false,
             event_due: Instant::NEVER,
+            sent: Instant::NEVER,
             inhibited_until: Instant(0),
         }
     }
@@ -113,6 +116,14 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
+    /// Sends the selected objects that have not been sent: those that were selected in Operational.
+    pub(crate) fn send_new(&mut self) {
+        for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
+            watched.is_pending |= watched.sent.is_none();
+            self.is_pending |= watched.is_pending;
+        }
+    }
+
     /// Deselects the objects that a TPDO maps.
     pub(crate) fn deselect(&mut self, layout: &Layout) {
         for watched in &mut self.watched {
@@ -136,10 +147,23 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
-    /// Discards everything that waits, on leaving Operational.
+    /// Discards everything that waits, on leaving Operational. The inhibit time continues.
     pub(crate) fn stop(&mut self) {
         self.watched.iter_mut().for_each(|watched| watched.is_pending = false);
-        (self.is_pending, self.event_due, self.inhibited_until) = (false, Instant::NEVER, Instant(0));
+        (self.is_pending, self.event_due) = (false, Instant::NEVER);
+        self.inhibited_until = self.inhibit_end();
+    }
+
+    /// At a reset: the inhibit time does not outlast the next `stop`.
+    pub(crate) fn forget_sent(&mut self) {
+        self.sent = Instant::NEVER;
+    }
+
+    fn inhibit_end(&self) -> Instant {
+        match (self.sent, &self.settings) {
+            (Instant::NEVER, _) | (_, None) => Instant(0),
+            (sent, Some(settings)) => sent.plus(Duration::from_inhibit(settings.inhibit)),
+        }
     }
 
     /// When the next frame or the event timer is due.
@@ -148,7 +172,7 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects whose value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
             for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
@@ -160,14 +184,14 @@ impl<const M: usize> Scanner<M> {
     }
 
     /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let Some(settings) = self.settings else { return };
         let elapsed = context.now >= self.event_due;
         if elapsed {
             self.send_all();
         }
-        if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
-            self.event_due = context.now + Duration::from_millis(settings.event.into());
+        if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {
+            self.event_due = context.now.plus(Duration::from_millis(settings.event.into()));
         }
         if !self.is_pending {
             return;
@@ -179,13 +203,14 @@ impl<const M: usize> Scanner<M> {
             let data = watched.value(image);
             // All these frames have the same identifier but different objects: no frame may replace another in the
             // queue.
-            if !context.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
-                self.inhibited_until = context.now + RETRY;
+            if !context.send_event(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+                self.inhibited_until = context.now.plus(RETRY);
                 return;
             }
             (watched.sent, watched.is_pending) = (Some(data), false);
+            self.sent = context.now;
             if settings.inhibit != 0 {
-                self.inhibited_until = context.now + Duration::from_inhibit(settings.inhibit);
+                self.inhibited_until = context.now.plus(Duration::from_inhibit(settings.inhibit));
             }
         }
         self.is_pending = false;

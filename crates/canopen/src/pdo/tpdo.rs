@@ -9,7 +9,7 @@
 
 use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
-use crate::transmit::{Context, RETRY};
+use crate::transmit::{ProcessContext, RETRY};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
@@ -43,6 +43,15 @@ impl Settings {
         layout: Layout::EMPTY,
     };
 
+    /// The end of the inhibit time after a transmission. The types 254 and 255 have an inhibit time (CiA 301, 7.5.2.35).
+    fn inhibit_end(&self, sent: Instant) -> Instant {
+        match sent {
+            Instant::NEVER => Instant(0),
+            _ if self.transmission.is_event_driven() => sent.plus(Duration::from_inhibit(self.inhibit)),
+            _ => Instant(0),
+        }
+    }
+
     fn sends_on_change(&self) -> bool {
         self.transmission == Transmission::Event && self.event == 0 && self.events_of.is_none()
     }
@@ -66,6 +75,8 @@ pub(crate) struct Tpdo {
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
     event_due: Instant,
+    /// The last transmission since the last reset, or `NEVER`. No reconfiguration shortens the inhibit time.
+    sent: Instant,
     /// The end of the inhibit time; earlier, a transmission waits.
     inhibited_until: Instant,
     /// When to ask the application for events. Used only for a TPDO that sends events.
@@ -89,10 +100,6 @@ impl Events {
     const BEGIN: Events = Events { may_wait: true, is_open: true, is_silent: false };
 }
 
-/// Free places that events leave in the transmit queue. The bus may be busy for minutes, but events can wait in the
-/// application.
-const ROOM_FOR_OTHERS: usize = 8;
-
 impl Tpdo {
     pub(crate) const fn new() -> Tpdo {
         Tpdo {
@@ -104,6 +111,7 @@ impl Tpdo {
             is_counting: false,
             data: None,
             event_due: Instant::NEVER,
+            sent: Instant::NEVER,
             inhibited_until: Instant(0),
             events: Events::NONE,
         }
@@ -140,17 +148,18 @@ impl Tpdo {
     }
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, context: &Context<'_, impl Transmit>) -> Option<u16> {
+    pub(crate) fn asks_for_event(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Option<u16> {
+        let number = self.events_of()?;
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
             && context.now >= self.inhibited_until;
-        if is_asked_now && context.room() <= ROOM_FOR_OTHERS {
-            (self.events.may_wait, self.inhibited_until) = (true, context.now + RETRY);
+        if is_asked_now && !context.takes_event(settings.id.get(), settings.layout.len().into()) {
+            (self.events.may_wait, self.inhibited_until) = (true, context.now.plus(RETRY));
             return None;
         }
-        settings.events_of.filter(|_| is_asked_now)
+        is_asked_now.then_some(number)
     }
 
     /// Handles the answer of the application. If `is_event`, the event is in the image.
@@ -158,7 +167,7 @@ impl Tpdo {
         &mut self,
         is_event: bool,
         image: &[u8],
-        context: &mut Context<'_, impl Transmit>,
+        context: &mut ProcessContext<'_, impl Transmit>,
     ) {
         if is_event || self.events.is_silent && self.data.is_some() {
             self.send(image, context);
@@ -176,11 +185,16 @@ impl Tpdo {
         if is_asked { self.inhibited_until } else { Instant::NEVER }
     }
 
-    /// Discards a waiting transmission and all deadlines, on leaving Operational.
+    /// Discards a waiting transmission and the event timer, on leaving Operational. The inhibit time continues.
     pub(crate) fn stop(&mut self) {
         (self.pending, self.syncs, self.is_counting, self.data) = (false, 0, false, None);
-        (self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));
+        (self.event_due, self.inhibited_until) = (Instant::NEVER, self.settings.inhibit_end(self.sent));
         self.events = Events::NONE;
+    }
+
+    /// At a reset: the inhibit time does not outlast the next `stop`.
+    pub(crate) fn forget_sent(&mut self) {
+        self.sent = Instant::NEVER;
     }
 
     /// When the next transmission or the event timer is due.
@@ -189,7 +203,12 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_sync(
+        &mut self,
+        sync: Sync,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit>,
+    ) {
         let transmission = self.settings.transmission;
         match transmission {
             Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => {
@@ -221,8 +240,10 @@ impl Tpdo {
         is_turn
     }
 
-    /// Answers a remote frame. TPDOs of the synchronous types 0 to 240 are sent by SYNC only and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    /// Answers a remote frame; the types 254 and 255 answer when the inhibit time is over. TPDOs of the synchronous types
+    /// 0 to 240 are sent by SYNC only and do not answer.
+    #[inline(never)]
+    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let settings = &self.settings;
         if !settings.answers_remote {
             return;
@@ -230,12 +251,13 @@ impl Tpdo {
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // In a full queue the sample is dropped: the client repeats its request.
-                context.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                context.send_pdo(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             // Before the first event, there is nothing to send.
             _ if settings.events_of.is_some() && self.data.is_none() => (),
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, context);
+                self.pending = true;
+                self.poll(image, context);
             }
             _ => (),
         }
@@ -247,7 +269,7 @@ impl Tpdo {
     }
 
     /// Sends the values if a mapped value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         if self.settings.sends_on_change() && self.has_changed(image) {
             self.pending = true;
             self.poll(image, context);
@@ -268,11 +290,11 @@ impl Tpdo {
     }
 
     /// Sends the TPDO if a transmission is due.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
+    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let elapsed = context.now >= self.event_due;
         let sends_events = self.events_of().is_some();
         if elapsed || sends_events && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(context.now);
+            self.event_due = self.event_due.following(self.settings.event, context.now);
         }
         if !sends_events {
             self.pending |= elapsed;
@@ -284,34 +306,32 @@ impl Tpdo {
         }
     }
 
-    /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
-    fn following_event(&self, now: Instant) -> Instant {
-        if self.settings.event == 0 {
-            return Instant::NEVER;
-        }
-        let period = Duration::from_millis(self.settings.event.into());
-        let next = self.event_due + period;
-        if self.event_due != Instant::NEVER && next > now { next } else { now + period }
-    }
-
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
-    fn send(&mut self, image: &[u8], context: &mut Context<'_, impl Transmit>) {
-        let Settings { id, layout, transmission, inhibit, .. } = &self.settings;
+    fn send(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+        let Settings { id, layout, transmission, .. } = &self.settings;
         let data = layout.gather(image);
-        let frame = Frame::data_frame(*id, layout.len(), data);
+        let frame = || Frame::data_frame(*id, layout.len(), data);
         let sends_events = self.settings.events_of.is_some();
-        let is_sent = if sends_events { context.send(frame) } else { context.send_state(frame) };
+        let is_sent = if sends_events { context.send_event(frame()) } else { context.send_pdo(frame()) };
         self.pending = !is_sent;
         if is_sent {
-            self.data = Some(data);
-            if *inhibit != 0 {
-                self.inhibited_until = context.now + Duration::from_inhibit(*inhibit);
-            }
+            (self.data, self.sent) = (Some(data), context.now);
         } else {
-            self.inhibited_until = context.now + RETRY;
+            self.inhibited_until = context.now.plus(RETRY);
         }
-        if transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(context.now);
+        if transmission.is_event_driven() {
+            self.restart_timers(context.now);
+        }
+    }
+
+    /// A TPDO of type 254 or 255 has been sent, or has to wait.
+    #[inline(never)]
+    fn restart_timers(&mut self, now: Instant) {
+        if !self.pending && self.settings.inhibit != 0 {
+            self.inhibited_until = self.settings.inhibit_end(self.sent);
+        }
+        if self.event_due == Instant::NEVER {
+            self.event_due = self.event_due.following(self.settings.event, now);
         }
     }
 }

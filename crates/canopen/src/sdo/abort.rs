@@ -3,6 +3,7 @@
 /// Why a transfer was refused or aborted. One byte in memory; `code` gives the 32 bits of the abort message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Abort {
     /// The toggle bit did not alternate.
     Toggle,

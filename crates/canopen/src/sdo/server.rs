@@ -68,6 +68,11 @@ impl Server {
         matches!(self.transfer, Transfer::Idle)
     }
 
+    /// Whether no transfer is under way, or one whose response waits for [`release`](Server::release).
+    pub(crate) fn is_between_requests(&self) -> bool {
+        matches!(self.transfer, Transfer::Idle | Transfer::Deferred)
+    }
+
     /// Whether a block download is under way.
     pub(crate) fn takes_block(&self) -> bool {
         matches!(self.transfer, Transfer::BlockDownload(_))
@@ -79,11 +84,13 @@ impl Server {
     }
 
     /// The next deadline of [`expire`](Server::expire).
+    // Not inlined: three callers.
+    #[inline(never)]
     pub(crate) fn deadline(&self) -> Instant {
         match &self.transfer {
             Transfer::Idle => Instant::NEVER,
-            _ if self.is_within_block() => self.active + BLOCK_PAUSE,
-            _ => self.active + TIME_OUT,
+            _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
+            _ => self.active.plus(TIME_OUT),
         }
     }
 
@@ -193,7 +200,7 @@ impl Server {
         }
         match &mut self.transfer {
             Transfer::BlockDownload(receiver)
-                if receiver.is_within_block() && now < self.active + TIME_OUT =>
+                if receiver.is_within_block() && now < self.active.plus(TIME_OUT) =>
             {
                 let sequence = receiver.acknowledge();
                 self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))

@@ -1,14 +1,14 @@
 //! Servers that try to keep a client busy for ever, and servers that send random data. No transfer takes longer than
 //! its limit, and none panics.
 
-use canopen::client::sdo::{BlockDownload, BlockUpload, Buffer, Download, Error, Upload};
+use canopen::client::sdo::{BlockDownload, BlockUpload, Buffer, Download, Error, Options, Upload};
 use canopen::client::{Service, lss};
 use canopen::sdo::{BlockSegment, BlockSize, Bytes, Request, Response, Segment};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use crate::server::{Device, NODE, OBJECT, Outcome, once, run};
+use crate::server::{Device, NODE, OBJECT, Outcome, Server, once, run};
 
 /// The limit of a transfer, plus the time of its last frames.
 const BOUND: u64 = 10_000_000 + 1_000;
@@ -137,4 +137,41 @@ proptest! {
         let (_, end, _) = run(&mut lss::store(options), &mut parrot);
         prop_assert!(end.0 < 400_000);
     }
+}
+
+/// A server that falls silent after the second answer of the first attempt.
+fn silent_once(value: &[u8]) -> impl FnMut([u8; 8]) -> Vec<[u8; 8]> {
+    let (mut server, mut attempts, mut answers) = (Server::new(value), 0, 0);
+    move |request| {
+        if let Some(Request::Upload(_) | Request::BlockUpload { .. }) = Request::parse(&request) {
+            (attempts, answers) = (attempts + 1, 0);
+        }
+        answers += 1;
+        let answer = server.answer(request);
+        if attempts == 1 && answers > 2 { vec![] } else { answer }
+    }
+}
+
+#[test]
+fn a_retry_begins_without_the_data_of_the_first_attempt() {
+    let value: Vec<u8> = (0..60).collect();
+    let options = Options { retries: 1, block_size: BlockSize::new(2).unwrap(), ..once() };
+    let mut memory = [0; 64];
+    let mut transfer = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), options);
+    assert_eq!(bounded(&mut transfer, &mut silent_once(&value)), Ok(()));
+    assert_eq!(transfer.into_sink().as_slice(), value);
+    let mut memory = [0; 64];
+    let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), options);
+    assert_eq!(bounded(&mut transfer, &mut silent_once(&value)), Ok(()));
+    assert_eq!(transfer.into_sink().as_slice(), value);
+}
+
+#[test]
+fn an_answer_of_another_protocol_is_no_silence() {
+    let mut memory = [0; 64];
+    let mut transfer = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
+    let mut device = |_: [u8; 8]| vec![Response::DownloadedSegment { toggle: false }.encode()];
+    assert_eq!(bounded(&mut transfer, &mut device), Err(Error::Unexpected));
+    let mut transfer = Download::new(NODE, OBJECT, &[1], once());
+    assert_eq!(bounded(&mut transfer, &mut |_: [u8; 8]| vec![]), Err(Error::NoAnswer));
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use canopen::dictionary::{Entry, Group};
+use canopen::dictionary::{Entry, Group, Groups};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, ErrorClass, Fault, Part, Soundness, Stored};
@@ -17,6 +17,8 @@ pub(crate) const SENSOR_BREAK: u8 = 0;
 pub(crate) const PRESSURE_RAIL: u8 = 1;
 pub(crate) const TEMPERATURE_RAIL: u8 = 2;
 pub(crate) const UNEXPECTED_RESET: u8 = 3;
+/// The only condition to which 1029h:2 applies.
+pub(crate) const DEVICE_FAULT: u8 = 4;
 
 /// Calls of the application by the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +41,10 @@ pub(crate) struct Numbers {
     /// The stored values: communication, application, calibration.
     pub(crate) stored: [Vec<u8>; 3],
     pub(crate) is_damaged: bool,
+    /// The groups that a write to 6201h stores.
+    pub(crate) stores: Option<Groups>,
+    /// Why the memory accepts no job.
+    pub(crate) is_full: Option<Abort>,
     /// The reports of the device about the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
     pub(crate) told: Vec<Told>,
@@ -53,8 +59,13 @@ pub(crate) struct Numbers {
 }
 
 impl Application for Numbers {
-    const CONDITIONS: &'static [Condition] =
-        &[Condition::new(0x5006), Condition::new(0x8002), Condition::new(0x8001), Condition::new(0x6101)];
+    const CONDITIONS: &'static [Condition] = &[
+        Condition::new(0x5006),
+        Condition::new(0x8002),
+        Condition::new(0x8001),
+        Condition::new(0x6101),
+        Condition::new(0x5003).of_class(ErrorClass::DEVICE),
+    ];
 
     fn initialise(&mut self, image: &mut [u8]) {
         DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
@@ -72,6 +83,14 @@ impl Application for Numbers {
         }
         assert_eq!((entry.index(), entry.sub()), (0x6102, 0));
         if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn stores(&self, entry: &Entry) -> Option<Groups> {
+        self.stores.filter(|_| entry.index() == 0x6201)
+    }
+
+    fn can_store(&self) -> Result<(), Abort> {
+        self.is_full.map_or(Ok(()), Err)
     }
 
     fn sends_events(&self, tpdo: u16) -> bool {

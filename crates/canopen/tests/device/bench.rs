@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use canopen::sdo::{Abort, Multiplexer, Request, Response};
+use canopen::testing::settle;
 use canopen::{
     Action, BusEvent, Device, Duration, ErrorClass, Frame, Instant, Next, NodeId, QueueFull, Transmit,
 };
@@ -13,7 +14,9 @@ use crate::application::Numbers;
 use crate::exchange;
 use crate::rows::ROWS;
 
-pub(crate) use crate::application::{PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL, Told, UNEXPECTED_RESET};
+pub(crate) use crate::application::{
+    DEVICE_FAULT, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL, Told, UNEXPECTED_RESET,
+};
 pub(crate) use crate::rows::{DICTIONARY, rows};
 
 /// A transmit queue that keeps all frames, as long as it has room.
@@ -99,15 +102,16 @@ impl Bench {
     }
 
     /// Keeps the result of a call. Waiting actions are returned by the next call.
-    fn follow(&mut self, next: Next) -> Instant {
-        self.parameters |= next.parameters;
-        match next.action {
-            Some(action) => {
-                self.actions.push_back(action);
-                self.poll()
-            }
-            None => next.due(),
+    fn follow(&mut self, next: Next) {
+        self.keep(next);
+        if next.action.is_some() {
+            self.poll();
         }
+    }
+
+    fn keep(&mut self, next: Next) {
+        self.parameters |= next.parameters;
+        self.actions.extend(next.action);
     }
 
     /// The next action that was left to the caller.
@@ -167,9 +171,14 @@ impl Bench {
         self.poll();
     }
 
+    /// Does all work that is due, and returns the next deadline.
     pub(crate) fn poll(&mut self) -> Instant {
-        let next = self.device.poll(self.now, &mut self.out);
-        self.follow(next)
+        let next = settle(self.now, || {
+            let next = self.device.poll(self.now, &mut self.out);
+            self.keep(next);
+            next
+        });
+        next.due()
     }
 
     pub(crate) fn nmt(&mut self, command: u8) {
@@ -184,7 +193,7 @@ impl Bench {
     pub(crate) fn run(&mut self, span: Duration) {
         let end = self.now + span;
         loop {
-            let due = self.poll().max(Instant(self.now.0 + 1));
+            let due = self.poll();
             if due > end {
                 self.now = end;
                 return;
@@ -198,7 +207,7 @@ impl Bench {
         let (start, end) = (self.now, self.now + span);
         let mut times = vec![];
         loop {
-            let due = self.poll().max(Instant(self.now.0 + 1));
+            let due = self.poll();
             let sent = self.take().iter().filter(|frame| frame.id() == id).count();
             times.extend(std::iter::repeat_n(self.now.0 - start.0, sent));
             if due > end {

@@ -390,3 +390,21 @@ proptest! {
         prop_assert_eq!(client.upload(DOMAIN, block_size), (data(len), end(&data(len))));
     }
 }
+
+#[test]
+fn a_block_that_finds_the_queue_full_continues_after_one_millisecond() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(700);
+    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 });
+    client.bench.out.room = 30;
+    client.request(Request::BlockUploadStart);
+    client.bench.out.room = 1000;
+    let id = 0x580 + u16::from(crate::bench::ID);
+    let segments =
+        |bench: &crate::bench::Bench| bench.out.frames.iter().filter(|frame| frame.id() == id).count();
+    assert_eq!(segments(&client.bench), 20);
+    client.bench.run(Duration(999));
+    assert_eq!(segments(&client.bench), 20);
+    client.bench.run(Duration(1));
+    assert_eq!(segments(&client.bench), 100);
+}

@@ -1,8 +1,8 @@
 //! EMCY: messages, error register, the list 1003h and the COB-ID 1014h.
 
 use crate::bench::{Bench, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL};
-use canopen::BusEvent;
 use canopen::emcy::Message;
+use canopen::{BusEvent, Duration, Frame};
 
 fn emcy(code: u16, register: u8) -> (u16, Vec<u8>) {
     (0x085, Message { code, register, detail: [0; 5] }.encode().to_vec())
@@ -37,6 +37,7 @@ fn the_list_has_what_was_signalled_newest_first() {
     assert_eq!(bench.read(0x1003, 1), Err(0x0800_0024));
     bench.raise(SENSOR_BREAK);
     bench.raise(PRESSURE_RAIL);
+    bench.poll();
     assert_eq!(bench.read(0x1003, 0), Ok(vec![2]));
     assert_eq!(bench.read(0x1003, 1), Ok(vec![0x02, 0x80, 0, 0]));
     assert_eq!(bench.read(0x1003, 2), Ok(vec![0x06, 0x50, 0, 0]));
@@ -46,6 +47,7 @@ fn the_list_has_what_was_signalled_newest_first() {
 fn the_list_is_cleared_by_a_zero_and_by_nothing_else() {
     let mut bench = Bench::booted();
     bench.raise(SENSOR_BREAK);
+    bench.poll();
     assert_eq!(bench.write(0x1003, 0, &[1]), Err(0x0609_0030));
     assert_eq!(bench.write32(0x1003, 1, 0), Err(0x0601_0002));
     assert_eq!(bench.write(0x1003, 0, &[0]), Ok(()));
@@ -65,7 +67,7 @@ fn messages_wait_for_room_in_order_and_the_oldest_are_kept() {
     bench.poll();
     assert_eq!(bench.sent(), []);
     bench.out.room = 100;
-    bench.run(canopen::Duration::from_millis(1));
+    bench.run(Duration::from_millis(1));
     let expected: Vec<_> = (0..4).flat_map(|_| [emcy(0x5006, 1), emcy(0, 0)]).collect();
     assert_eq!(bench.sent(), expected);
 }
@@ -88,17 +90,90 @@ fn a_fault_that_is_still_there_after_a_reset_is_news_again() {
 fn its_identifier_changes_only_while_it_does_not_exist() {
     let mut bench = Bench::booted();
     assert_eq!(bench.read(0x1014, 0), Ok(vec![0x85, 0, 0, 0]));
-    for refused in [0x86, 0x4000_0085, 0x2000_0085, 0x0000_0885, 0x8000_0005 | 0x600] {
+    for refused in [0x86, 0x4000_0085, 0x2000_0085, 0x0000_0885] {
         assert_eq!(bench.write32(0x1014, 0, refused), Err(0x0609_0030));
     }
-    bench.write32(0x1014, 0, 0x8000_0085).unwrap();
+    for without_emcy in [0x8000_0000, 0x8000_0605, 0x8000_0085] {
+        assert_eq!(bench.write32(0x1014, 0, without_emcy), Ok(()), "the CAN-ID is not used");
+        assert_eq!(bench.read(0x1014, 0), Ok(without_emcy.to_le_bytes().to_vec()));
+    }
+    for restricted in [0, 0x605] {
+        assert_eq!(bench.write32(0x1014, 0, restricted), Err(0x0609_0030));
+    }
     bench.raise(SENSOR_BREAK);
     bench.poll();
     assert_eq!(bench.sent(), []);
     bench.write32(0x1014, 0, 0x0000_00A0).unwrap();
     bench.raise(PRESSURE_RAIL);
     bench.poll();
-    assert_eq!(bench.sent(), [(0x0A0, vec![0x02, 0x80, 1, 0, 0, 0, 0, 0])]);
+    let told = [[0x06, 0x50, 1, 0, 0, 0, 0, 0], [0x02, 0x80, 1, 0, 0, 0, 0, 0]];
+    assert_eq!(bench.sent(), told.map(|data| (0x0A0, data.to_vec())));
+}
+
+/// The codes in 1003h, newest first.
+fn listed(bench: &mut Bench) -> Vec<u16> {
+    let count = bench.read(0x1003, 0).unwrap()[0].min(2);
+    let entry = |sub| bench.read(0x1003, sub).unwrap();
+    (1..=count).map(entry).map(|entry| u16::from_le_bytes([entry[0], entry[1]])).collect()
+}
+
+#[test]
+fn the_list_has_no_error_that_was_not_sent() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1014, 0, 0x8000_0085).unwrap();
+    bench.raise(SENSOR_BREAK);
+    bench.run(Duration::from_millis(10));
+    assert_eq!(listed(&mut bench), [], "EMCY is switched off");
+    bench.write32(0x1014, 0, 0x85).unwrap();
+    bench.run(Duration::from_millis(10));
+    assert_eq!(listed(&mut bench), [0x5006], "switched on during the fault");
+
+    bench.write(0x1015, 0, &10_000_u16.to_le_bytes()).unwrap();
+    bench.raise(PRESSURE_RAIL);
+    bench.run(Duration::from_millis(900));
+    assert_eq!(listed(&mut bench), [0x5006], "the inhibit time holds the message back");
+    bench.run(Duration::from_millis(200));
+    assert_eq!(listed(&mut bench), [0x8002, 0x5006]);
+}
+
+#[test]
+fn emcy_that_is_switched_on_reports_the_faults_that_are_present() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1014, 0, 0x8000_0085).unwrap();
+    bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+    bench.write(0x1600, 0, &[1]).unwrap();
+    bench.write32(0x1400, 1, 0x205).unwrap();
+    bench.write32(0x1016, 2, 0x0009_000A).unwrap();
+    bench.nmt(1);
+    for frame in [(0x709, &[5][..]), (0x205, &[1])] {
+        bench.receive(Frame::new(frame.0, frame.1).unwrap());
+    }
+    bench.raise(SENSOR_BREAK);
+    bench.raise(PRESSURE_RAIL);
+    bench.clear(PRESSURE_RAIL);
+    bench.run(Duration::from_millis(20));
+    bench.take();
+    bench.write32(0x1014, 0, 0x85).unwrap();
+    bench.poll();
+    let codes: Vec<_> = bench.sent().into_iter().filter(|(id, _)| *id == 0x085).collect();
+    let codes = codes.iter().map(|(_, data)| (u16::from_le_bytes([data[0], data[1]]), data[3]));
+    assert_eq!(codes.collect::<Vec<_>>(), [(0x5006, 0), (0x8130, 2), (0x8210, 1)]);
+}
+
+#[test]
+fn a_shorter_inhibit_time_releases_a_message_that_waits() {
+    for (inhibit, expected) in [(0_u16, vec![0]), (2000, vec![100_000])] {
+        let mut bench = Bench::booted();
+        bench.write(0x1015, 0, &10_000_u16.to_le_bytes()).unwrap();
+        bench.raise(SENSOR_BREAK);
+        bench.raise(PRESSURE_RAIL);
+        bench.run(Duration::from_millis(100));
+        bench.take();
+        bench.write(0x1015, 0, &inhibit.to_le_bytes()).unwrap();
+        let mut times = vec![0; bench.take().iter().filter(|frame| frame.id() == 0x085).count()];
+        times.extend(bench.times_of(0x085, Duration::from_millis(3000)));
+        assert_eq!(times, expected, "1015h = {inhibit}");
+    }
 }
 
 #[test]
@@ -108,10 +183,10 @@ fn the_inhibit_time_separates_messages() {
     bench.raise(SENSOR_BREAK);
     bench.raise(PRESSURE_RAIL);
     bench.raise(TEMPERATURE_RAIL);
-    assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0, 5_000, 10_000]);
+    assert_eq!(bench.times_of(0x085, Duration::from_millis(30)), [0, 5_000, 10_000]);
     bench.clear(SENSOR_BREAK);
     bench.raise(SENSOR_BREAK);
-    assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0]);
+    assert_eq!(bench.times_of(0x085, Duration::from_millis(30)), [0]);
     bench.bus(BusEvent::Overrun);
-    assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0]);
+    assert_eq!(bench.times_of(0x085, Duration::from_millis(30)), [0]);
 }

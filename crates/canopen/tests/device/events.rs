@@ -98,11 +98,11 @@ fn with_both_times_the_inhibit_time_separates_what_the_timer_sends() {
 #[test]
 fn events_leave_room_in_the_queue_and_wait_with_the_application() {
     let mut bench = operational(255, 0, 0);
-    bench.out.room = 10;
+    bench.out.room = 14;
     push(&mut bench, 1..=5);
     assert_eq!(told(&mut bench), [1, 2]);
     bench.run(Duration::from_millis(10));
-    assert_eq!((told(&mut bench), bench.out.room), (vec![], 8));
+    assert_eq!((told(&mut bench), bench.out.room), (vec![], 12));
     bench.out.room = 50;
     bench.run(MS);
     assert_eq!(told(&mut bench), [3, 4, 5], "without another call of the application");
@@ -148,5 +148,31 @@ fn the_application_switches_pdos() {
         bench.run(Duration::from_millis(250));
         assert_eq!(!told(&mut bench).is_empty(), on, "{command}");
         assert_eq!(listens(&bench), on);
+    }
+}
+
+/// A queue that is short for one moment must not make another event-driven TPDO due in the past (K21).
+#[test]
+fn a_short_queue_leaves_no_deadline_in_the_past_for_any_tpdo() {
+    for room in 0..=9 {
+        let mut bench = operational(255, 0, 0);
+        bench.out.room = room;
+        push(&mut bench, 1..=5);
+        bench.run(Duration::from_millis(20));
+        bench.out.room = usize::MAX;
+        bench.run(Duration::from_millis(20));
+        assert_eq!(told(&mut bench), [1, 2, 3, 4, 5], "room for {room}");
+    }
+}
+
+#[test]
+fn the_start_sends_the_present_state_at_once_and_starts_the_event_timer() {
+    for transmission in [254, 255] {
+        let mut bench = configured(transmission, 0, 500);
+        bench.set_value(1, &[9, 0, 0, 0]);
+        bench.nmt(1);
+        assert_eq!(told(&mut bench), [9], "type {transmission}");
+        let start = bench.times_of(TPDO, Duration::from_millis(1000));
+        assert_eq!(start, [500_000, 1_000_000], "type {transmission}");
     }
 }

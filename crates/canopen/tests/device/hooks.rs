@@ -51,9 +51,9 @@ fn an_rpdo_is_told_when_its_values_are_there() {
     receive(&mut bench, &[7, 0]);
     assert_eq!((bench.told(), value(&bench, 0x6200)), (vec![Told::Received(1)], vec![7, 0]));
     receive(&mut bench, &[8]);
-    assert_eq!(bench.told(), [Told::Fault(Fault::RpdoTooShort(0), true)]);
+    assert_eq!(bench.told(), [Told::Fault(Fault::RpdoTooShort(1), true)]);
     receive(&mut bench, &[8, 0]);
-    assert_eq!(bench.told(), [Told::Received(1), Told::Fault(Fault::RpdoTooShort(0), false)]);
+    assert_eq!(bench.told(), [Told::Received(1), Told::Fault(Fault::RpdoTooShort(1), false)]);
 }
 
 #[test]

@@ -21,5 +21,7 @@ mod sdo;
 mod service_device;
 mod states;
 mod store;
+mod store_at_once;
 mod sync;
 mod tpdo;
+mod wrong_tables;

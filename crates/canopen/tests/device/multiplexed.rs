@@ -98,10 +98,10 @@ fn with_an_event_timer_the_timer_alone_sends() {
 #[test]
 fn a_full_queue_delays_and_leaving_operational_drops() {
     let mut bench = sender(DESTINATION);
-    bench.out.room = 1;
+    bench.out.room = 13;
     bench.nmt(1);
     assert_eq!(mpdos(&mut bench).len(), 1);
-    bench.out.room = 10;
+    bench.out.room = 20;
     bench.run(Duration::from_millis(2));
     assert_eq!(mpdos(&mut bench).len(), 2);
     bench.nmt(0x80);
@@ -144,6 +144,19 @@ fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
             let mut bench = receiver(DESTINATION);
             let [low, high, sub] = object;
             bench.receive(Frame::new(RPDO, &[address, low, high, sub, 1, 2, 3, 4]).unwrap());
+            assert_eq!(errors(&mut bench), expected, "{object:x?}");
+        }
+    }
+}
+
+/// 6203h accepts -5 to 5, and the application rejects 13 at 6201h.
+#[test]
+fn a_value_that_the_object_rejects_is_an_error_for_the_node_that_is_addressed() {
+    for (object, value) in [([0x03, 0x62, 0], 6), ([0x01, 0x62, 0], 13)] {
+        for (address, expected) in [(0x80 | ID, vec![0x8230]), (0x80, vec![])] {
+            let mut bench = receiver(DESTINATION);
+            let [low, high, sub] = object;
+            bench.receive(Frame::new(RPDO, &[address, low, high, sub, value, 0, 0, 0]).unwrap());
             assert_eq!(errors(&mut bench), expected, "{object:x?}");
         }
     }
@@ -231,4 +244,19 @@ fn the_application_leaves_out_what_is_not_there() {
     bench.write(0x6201, 0, &[1]).unwrap();
     bench.set_value(1, &[0; 4]);
     assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]]);
+}
+
+#[test]
+fn reconfiguration_does_not_shorten_the_inhibit_time() {
+    let mut bench = sender(DESTINATION);
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 3, &5000_u16.to_le_bytes()).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 1);
+    bench.run(Duration::from_millis(100));
+    bench.write(0x1800, 5, &[100, 0]).unwrap();
+    bench.nmt(0x80);
+    bench.nmt(1);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(450)), [400_000]);
 }

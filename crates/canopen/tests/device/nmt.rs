@@ -1,8 +1,8 @@
 //! NMT: commands, the services of each state, boot-up, start-up and error behaviour.
 
-use crate::bench::{Bench, ID, SENSOR_BREAK, UNEXPECTED_RESET};
+use crate::bench::{Bench, DEVICE_FAULT, ID, SENSOR_BREAK, UNEXPECTED_RESET};
 use canopen::nmt::State;
-use canopen::{Action, Duration, ErrorClass, Frame};
+use canopen::{Action, BusEvent, Duration, ErrorClass, Frame};
 
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -167,9 +167,11 @@ fn a_node_with_an_error_does_not_start_by_itself() {
 fn error_behaviour_0_leaves_operational_only() {
     let mut bench = Bench::operational();
     bench.error(ErrorClass::COMMUNICATION);
+    bench.poll();
     assert_eq!(bench.device.state(), State::PreOperational);
     bench.nmt(STOP);
     bench.error(ErrorClass::COMMUNICATION);
+    bench.poll();
     assert_eq!(bench.device.state(), State::Stopped);
 }
 
@@ -179,7 +181,107 @@ fn error_behaviour_2_stops_and_others_change_nothing() {
         let mut bench = Bench::operational();
         bench.write(0x1029, 1, &[value]).unwrap();
         bench.error(ErrorClass::COMMUNICATION);
+        bench.poll();
         assert_eq!(bench.device.state(), state);
+    }
+}
+
+/// EMCYs and heartbeats since the last call: code or state.
+fn reported(bench: &mut Bench) -> Vec<u16> {
+    let report = |(id, data): (u16, Vec<u8>)| match id {
+        0x085 => Some(u16::from_le_bytes([data[0], data[1]])),
+        0x705 => Some(data[0].into()),
+        _ => None,
+    };
+    bench.sent().into_iter().filter_map(report).collect()
+}
+
+/// An operational device that watches node 9 and sends its next heartbeat at the moment at which that of node 9 is
+/// missing.
+fn watching(behaviour: u8) -> Bench {
+    let mut bench = Bench::operational();
+    bench.write(0x1029, 1, &[behaviour]).unwrap();
+    bench.write(0x1029, 2, &[behaviour]).unwrap();
+    bench.write32(0x1016, 1, 0x0009_000A).unwrap();
+    bench.write(0x1017, 0, &[10, 0]).unwrap();
+    bench.receive(Frame::new(0x709, &[5]).unwrap());
+    bench.take();
+    bench
+}
+
+#[test]
+fn the_emcy_of_an_error_is_sent_before_the_state_changes() {
+    for (behaviour, state) in [(0, State::PreOperational), (1, State::Operational), (2, State::Stopped)] {
+        let mut bench = watching(behaviour);
+        bench.run(Duration::from_millis(11));
+        assert_eq!(reported(&mut bench), [0x8130, u16::from(state.code())], "1029h:1 = {behaviour}");
+        assert_eq!(bench.device.state(), state);
+
+        let mut bench = watching(behaviour);
+        bench.run(Duration::from_millis(9));
+        bench.take();
+        bench.raise(DEVICE_FAULT);
+        bench.poll();
+        assert_eq!((reported(&mut bench), bench.device.state()), (vec![0x5003], state));
+    }
+}
+
+#[test]
+fn a_node_that_has_to_stop_is_pre_operational_until_its_emcys_are_sent() {
+    let mut bench = watching(2);
+    bench.write(0x1017, 0, &[0, 0]).unwrap();
+    bench.write(0x1015, 0, &50_u16.to_le_bytes()).unwrap();
+    bench.raise(SENSOR_BREAK);
+    bench.poll();
+    bench.raise(DEVICE_FAULT);
+    bench.run(Duration::from_millis(4));
+    assert_eq!((reported(&mut bench), bench.device.state()), (vec![0x5006], State::PreOperational));
+    bench.run(Duration::from_millis(2));
+    assert_eq!((reported(&mut bench), bench.device.state()), (vec![0x5003], State::Stopped));
+
+    for (command, state) in [(PRE_OPERATIONAL, State::PreOperational), (START, State::Operational)] {
+        let mut bench = watching(2);
+        bench.out.room = 0;
+        bench.raise(DEVICE_FAULT);
+        bench.poll();
+        bench.nmt(command);
+        bench.out.room = 100;
+        bench.run(Duration::from_millis(5));
+        assert_eq!(bench.device.state(), state, "the master's command is the newer one");
+    }
+}
+
+#[test]
+fn bus_off_is_reported_before_the_node_stops() {
+    let mut bench = watching(2);
+    bench.write32(0x1016, 1, 0).unwrap();
+    bench.take();
+    bench.bus(BusEvent::BusOff);
+    assert_eq!(bench.device.state(), State::PreOperational, "no PDOs");
+    bench.bus(BusEvent::Recovered);
+    let codes: Vec<_> = reported(&mut bench).into_iter().filter(|code| *code > 0x7F).collect();
+    assert_eq!((codes, bench.device.state()), (vec![0x8140], State::Stopped));
+}
+
+#[test]
+fn an_error_found_at_the_start_is_reported_before_the_node_stops() {
+    for (behaviour, state) in [(0, State::PreOperational), (1, State::PreOperational), (2, State::Stopped)] {
+        for is_damaged in [true, false] {
+            let mut bench = Bench::unstarted();
+            bench.device.application_mut().stored[0] = vec![0x29, 0x10, 2, 1, 1, behaviour];
+            bench.device.application_mut().is_damaged = is_damaged;
+            if !is_damaged {
+                bench.raise(DEVICE_FAULT);
+            }
+            let codes = if is_damaged { vec![0x6302, 0x6303, 0x6300] } else { vec![0x5003] };
+            for _ in 0..2 {
+                bench.start();
+                bench.poll();
+                assert_eq!(reported(&mut bench), [&[0][..], &codes].concat(), "1029h:2 = {behaviour}");
+                assert_eq!(bench.device.state(), state, "1029h:2 = {behaviour}");
+                bench.nmt(RESET_COMMUNICATION);
+            }
+        }
     }
 }
 

@@ -245,3 +245,16 @@ fn another_segment_with_the_same_toggle_bit_is_no_repetition() {
     bench.ask(segment(false, false, b"1234567"));
     assert_eq!(bench.ask(segment(false, false, b"1234568")), abort(TEXT, 0x0503_0000));
 }
+
+#[test]
+fn no_transfer_outlives_a_reset() {
+    for command in [0x81, 0x82] {
+        let mut bench = Bench::booted();
+        assert_eq!(begin_download(&mut bench, Some(16)), Some(Response::Downloaded(TEXT)));
+        bench.nmt(command);
+        bench.start();
+        bench.take();
+        let response = bench.ask(segment(false, false, b"seven b"));
+        assert_eq!(response, abort(Multiplexer { index: 0, sub: 0 }, 0x0504_0001), "{command:02X}h");
+    }
+}

@@ -175,6 +175,49 @@ fn a_default_cob_id_follows_the_node_id_and_another_one_does_not() {
     assert_eq!((word(0x1014, 0), word(0x1800, 1), word(0x1400, 1)), (0x86, 0x186, 0x8000_0333));
 }
 
+/// Stores the COB-IDs of TPDO 1 and RPDO 1 and EMCY on node 5, and loads them on node 6.
+fn moved(tpdo: u32, rpdo: u32, emcy: u32) -> [u32; 3] {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0000 | tpdo).unwrap();
+    bench.write32(0x1800, 1, tpdo).unwrap();
+    bench.write32(0x1400, 1, rpdo).unwrap();
+    bench.write32(0x1014, 0, 0x8000_0000).unwrap();
+    bench.write32(0x1014, 0, emcy).unwrap();
+    save(&mut bench);
+    let stored = std::mem::take(&mut bench.device.application_mut().stored);
+    reset(&mut bench, RESET_COMMUNICATION);
+
+    let mut bench = Bench::unconfigured();
+    bench.device.application_mut().stored = stored;
+    for request in [[4, 1, 0, 0, 0, 0, 0, 0], [0x11, ID + 1, 0, 0, 0, 0, 0, 0], [4, 0, 0, 0, 0, 0, 0, 0]] {
+        bench.receive(canopen::Frame::new(0x7E5, &request).unwrap());
+    }
+    bench.start();
+    [(0x1800, 1), (0x1400, 1), (0x1014, 0)]
+        .map(|(index, sub)| DICTIONARY.field(index, sub).u32(bench.device.image()))
+}
+
+/// The flags in bits 30 and 31 do not matter: the CAN-ID alone decides.
+#[test]
+fn a_pre_defined_can_id_follows_the_node_id_with_any_flags() {
+    for flags in [0, 0x4000_0000, 0x8000_0000, 0xC000_0000] {
+        let [tpdo, rpdo, emcy] = moved(flags | 0x185, 0x8000_0205, 0x8000_0085);
+        assert_eq!([tpdo, rpdo, emcy], [flags | 0x186, 0x8000_0206, 0x8000_0086], "{flags:X}h");
+    }
+    assert_eq!(moved(0x186, 0xC000_0206, 0x0000_0086), [0x186, 0xC000_0206, 0x86], "absolute");
+    assert_eq!(moved(0x8000_0000, 0x8000_0000, 0x8000_0000), [0x8000_0000; 3], "absolute");
+}
+
+/// A firmware before 0.2 stored the CAN-ID with other flags as a number.
+#[test]
+fn a_cob_id_of_an_older_firmware_keeps_its_number() {
+    let mut bench = Bench::booted();
+    bench.device.application_mut().stored[0] = vec![0x00, 0x18, 1, 1, 4, 0x85, 0x01, 0x00, 0x40];
+    reset(&mut bench, RESET_COMMUNICATION);
+    assert_eq!(bench.read(0x1800, 1), Ok(vec![0x85, 0x01, 0x00, 0x40]));
+    assert_eq!(bench.device.application().loaded.last(), Some(&(Group::Communication, true)));
+}
+
 #[test]
 fn values_of_an_older_dictionary_fit_and_new_objects_have_their_defaults() {
     let mut bench = Bench::booted();

@@ -204,9 +204,9 @@ fn a_full_queue_is_tried_again_with_the_values_of_then() {
     bench.set_value(1, &[1, 0, 0, 0]);
     bench.sync();
     bench.set_value(1, &[2, 0, 0, 0]);
-    bench.out.room = 1;
+    bench.out.room = 5;
     bench.run(MS);
-    assert_eq!(sent(&mut bench), [[2, 0, 0, 0]]);
+    assert_eq!((sent(&mut bench), bench.out.room), (vec![vec![2, 0, 0, 0]], 4), "four are left for services");
     bench.run(Duration::from_millis(50));
     assert!(sent(&mut bench).is_empty());
 }
@@ -229,4 +229,64 @@ fn the_event_timer_has_a_second_name() {
     assert_eq!(bench.read(0x1800, 5), Ok(vec![20, 0]));
     assert_eq!(bench.times_of(TPDO, Duration::from_millis(45)), [0, 20_000, 40_000]);
     assert_eq!(bench.write(0x6105, 0, &[1, 2, 3]), Err(0x0607_0012));
+}
+
+/// The inhibit time separates two frames of an event-driven TPDO, whatever asks for the second one.
+#[test]
+fn nothing_shortens_the_inhibit_time() {
+    type Cause = fn(&mut Bench);
+    let causes: [(&str, Cause); 7] = [
+        ("remote frame", request),
+        ("event timer", |bench| bench.write(0x1800, 5, &[200, 0]).unwrap()),
+        ("transmission type", |bench| bench.write(0x1800, 2, &[254]).unwrap()),
+        ("bit 30", |bench| bench.write32(0x1800, 1, 0x4000_0185).unwrap()),
+        ("off and on", |bench| {
+            bench.write32(0x1800, 1, 0x8000_0185).unwrap();
+            bench.write32(0x1800, 1, 0x0000_0185).unwrap();
+        }),
+        ("other inhibit time", |bench| {
+            bench.write32(0x1800, 1, 0x8000_0185).unwrap();
+            bench.write(0x1800, 3, &6000_u16.to_le_bytes()).unwrap();
+            bench.write32(0x1800, 1, 0x0000_0185).unwrap();
+        }),
+        ("NMT", |bench| {
+            bench.nmt(0x80);
+            bench.nmt(1);
+        }),
+    ];
+    for (name, cause) in causes {
+        for transmission in [254, 255] {
+            let mut bench = bench(transmission, 5000, 0);
+            assert_eq!(sent(&mut bench).len(), 1);
+            bench.run(MS);
+            for _ in 0..20 {
+                cause(&mut bench);
+                bench.run(Duration::from_millis(20));
+                assert_eq!(sent(&mut bench).len(), 0, "{name}");
+            }
+            let rest = if name == "other inhibit time" { 199 } else { 99 };
+            assert_eq!(bench.times_of(TPDO, Duration::from_millis(250)), [rest * 1000], "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_node_reset_ends_the_inhibit_time() {
+    let mut bench = bench(255, 50_000, 0);
+    bench.take();
+    bench.nmt(0x82);
+    bench.start();
+    bench.take();
+    bench.nmt(1);
+    assert_eq!(sent(&mut bench).len(), 1);
+}
+
+/// CiA 301, 7.5.2.35: the inhibit time is one of the types 254 and 255.
+#[test]
+fn the_inhibit_time_delays_no_answer_of_type_253() {
+    let mut bench = bench(253, 5000, 0);
+    for _ in 0..3 {
+        request(&mut bench);
+        assert_eq!(sent(&mut bench).len(), 1);
+    }
 }

@@ -16,6 +16,24 @@ impl Application for Nothing {}
 #[derive(Default)]
 pub(crate) struct Sent(pub(crate) Vec<Frame>);
 
+/// All frames sent, by a queue that has room for this number of frames.
+pub(crate) struct Short {
+    pub(crate) sent: Vec<Frame>,
+    pub(crate) room: usize,
+}
+
+impl Transmit for Short {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.room = self.room.checked_sub(1).ok_or(QueueFull)?;
+        self.sent.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        self.room
+    }
+}
+
 impl Transmit for Sent {
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.0.push(frame);
@@ -35,8 +53,9 @@ pub(crate) fn download<
     const R: usize,
     const W: usize,
     const M: usize,
+    const S: u16,
 >(
-    device: &mut Device<A, N, T, R, W, M>,
+    device: &mut Device<A, N, T, R, W, M, S>,
     (index, sub): (u16, u8),
     bytes: &[u8],
     now: Instant,

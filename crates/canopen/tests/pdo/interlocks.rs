@@ -68,7 +68,10 @@ const fn value(index: u16, kind: Type, mapping: Mapping) -> Object {
 }
 
 const ROWS: &[&[Object]] = &[
-    &[Object::new(0x1001, 0, "", Type::Unsigned8, Access::ReadOnly)],
+    &[
+        Object::new(0x1001, 0, "", Type::Unsigned8, Access::ReadOnly),
+        Object::new(0x1005, 0, "", Type::Unsigned32, Access::ReadWrite).value(0x80),
+    ],
     &eight!(communication, 6, 0x1400),
     &eight!(mapping, 9, 0x1600),
     &eight!(communication, 6, 0x1800),

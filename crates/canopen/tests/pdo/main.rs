@@ -1,9 +1,11 @@
 //! PDOs of dictionaries made for these tests.
 
 mod bench;
+mod deadlines;
 #[allow(dead_code)] // These tests only write.
 #[path = "../exchange/mod.rs"]
 mod exchange;
 mod interlocks;
+mod lean;
 mod many;
 mod places;

@@ -57,11 +57,20 @@ pub const PROGRAM_AUTHORISATION_ROWS: &[Object] = &[
     Object::new(PROGRAM_AUTHORISATION, 3, "Response", Type::Unsigned64, Access::WriteOnly).handled(),
 ];
 
+/// Index of the object about the programs of the node.
+pub const PROGRAM_STATE: u16 = 0x2004;
+
+/// 2004h: facts about the board and its programs, for the master of an update.
+pub const PROGRAM_STATE_ROWS: &[Object] = &[
+    Object::highest(PROGRAM_STATE, 1, "Program state"),
+    Object::new(PROGRAM_STATE, 1, "Board", Type::Unsigned32, Access::ReadOnly).value(product::BOARD as i64),
+];
+
 /// Index of the object that counts lost events.
 pub const LOST_EVENTS: u16 = 0x2001;
 
 /// Number of kinds of lost events: sub-indexes 1 to this one.
-pub const LOST_EVENT_KINDS: u8 = 8;
+pub const LOST_EVENT_KINDS: u8 = 9;
 
 const fn count(sub: u8, name: &'static str) -> Object {
     Object::new(LOST_EVENTS, sub, name, Type::Unsigned32, Access::ReadOnly)
@@ -79,4 +88,20 @@ pub const LOST_EVENT_ROWS: &[Object] = &[
     count(6, "Timer alarms"),
     count(7, "Writes to the backup memory"),
     count(8, "Flash operations"),
+    count(9, "Resets of the CAN controller"),
+];
+
+/// Index of the object about the parameter memory.
+pub const PARAMETER_MEMORY: u16 = 0x2010;
+
+const fn memory(sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(PARAMETER_MEMORY, sub, name, kind, Access::ReadOnly)
+}
+
+/// 2010h: room and wear of the parameter memory. docs/communication.md describes when the node makes room.
+pub const PARAMETER_MEMORY_ROWS: &[Object] = &[
+    Object::highest(PARAMETER_MEMORY, 3, "Parameter memory"),
+    memory(1, "Saves left", Type::Unsigned16),
+    memory(2, "Page erases", Type::Unsigned16),
+    memory(3, "Page erases allowed", Type::Unsigned8),
 ];

@@ -7,7 +7,12 @@ use canopen::objects;
 
 pub use objects::pdo::{cob_id, count, event_timer, inhibit_time, slot, sync_start, transmission_type};
 
-use objects::pdo::{default_id, mapping, rpdo_parameter, tpdo_parameter};
+use objects::pdo::{default_id, rpdo_parameter, tpdo_parameter};
+
+/// A mapping parameter of a PDO that can be a multiplexed one, as each PDO of every personality can.
+const fn mapping(index: u16, name: &'static str, mapped: &[i64]) -> [Object; 9] {
+    objects::multiplexed(objects::pdo::mapping(index, name, mapped))
+}
 
 /// Defaults of a TPDO.
 pub struct Tpdo {

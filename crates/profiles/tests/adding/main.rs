@@ -39,7 +39,7 @@ impl Node {
     }
 
     fn read(&self, index: u16, sub: u8) -> u8 {
-        Personality::Switches.dictionary().field(index, sub).u8(&self.image)
+        Personality::Switches.dictionary().field(index, sub).get(&self.image)[0]
     }
 
     fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), canopen::sdo::Abort> {

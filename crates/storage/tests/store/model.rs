@@ -22,6 +22,8 @@ pub(crate) enum Step {
     Save(Changes),
     /// Start-up: `open` and `prepare`.
     Restart,
+    /// `make_room`, while the device runs.
+    MakeRoom,
 }
 
 /// Sets a group to `len` bytes of noise.
@@ -100,7 +102,12 @@ pub(crate) fn run<const ERASE: usize, const WORD: usize>(
             Step::Save(changes) => match store.save(&as_changes(changes)) {
                 Ok(()) => model = after(&model, changes),
                 Err(Error::Flash(PowerCut)) => return vec![after(&model, changes), model],
-                Err(Error::RestartNeeded | Error::TooLong) => {}
+                Err(Error::Full | Error::TooLong) => {}
+                Err(error) => panic!("{error}"),
+            },
+            Step::MakeRoom => match store.make_room() {
+                Ok(()) => {}
+                Err(Error::Flash(PowerCut)) => return vec![model],
                 Err(error) => panic!("{error}"),
             },
             Step::Restart => {

@@ -56,7 +56,7 @@ fn a_device_record_of_another_layout_is_none() {
 }
 
 #[test]
-fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
+fn a_save_into_two_used_up_pages_is_refused_until_the_next_start_and_nothing_is_lost() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
     for round in 0..20_u8 {
         let mut store = start(&mut flash, PAGES).unwrap();
@@ -64,7 +64,7 @@ fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
         while store.save(&application(&[round, saves])).is_ok() {
             saves += 1;
         }
-        assert_eq!(store.save(&application(&[0])), Err(Error::RestartNeeded));
+        assert_eq!(store.save(&application(&[0])), Err(Error::Full));
         let mut buf = [0; 2];
         store.load(GroupNumber::Three, &mut buf).unwrap();
         assert_eq!(buf, [round, saves - 1]);
@@ -72,6 +72,115 @@ fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
     }
     let [first, second] = flash.erases() else { panic!("two pages") };
     assert!(first.abs_diff(*second) <= 1 && first + second <= 22, "wear is even: {first} and {second}");
+}
+
+#[test]
+fn a_store_that_makes_room_while_it_runs_is_never_full() {
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
+    let mut store = start(&mut flash, PAGES).unwrap();
+    let before = store.erases();
+    for number in 0..2_000_u32 {
+        store.save(&application(&number.to_le_bytes())).unwrap();
+        if store.needs_room() {
+            store.make_room().unwrap();
+            assert!(!store.needs_room());
+        }
+        let mut buf = [0; 4];
+        store.load(GroupNumber::Three, &mut buf).unwrap();
+        assert_eq!(buf, number.to_le_bytes());
+    }
+    let (erases, moves) = (store.erases() - before, store.moves());
+    assert_eq!(erases, moves.into(), "each move costs one erase");
+    assert_eq!(start(&mut flash, PAGES).unwrap().moves(), moves, "the count is kept in the pages");
+    assert_eq!(flash.erases().iter().sum::<u32>(), erases + before);
+}
+
+#[test]
+fn saves_left_succeed_without_an_erase_with_device_records_between_them() {
+    let longest = [16, 60, 40, 20];
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut flash = MockFlash::<2048, 4>::new(4096, 0);
+    let pages = Pages::new(0, 2048);
+    let mut store = start(&mut flash, pages).unwrap();
+    let mut number = 0_u16;
+    for _ in 0..200 {
+        // Any history, then all saves that are left, of the greatest length.
+        for _ in 0..random.u32(..12) {
+            let group = *random.choice(GroupNumber::ALL.iter()).unwrap();
+            let len = random.usize(..=longest[group as usize - 1]);
+            number = number.wrapping_add(1);
+            let _ = store.save(&as_changes(&vec![set(group, number, len)]));
+        }
+        for left in (0..store.saves_left(&longest)).rev() {
+            number = number.wrapping_add(1);
+            store.save(&as_changes(&vec![set(GroupNumber::One, number, 16)])).unwrap();
+            number = number.wrapping_add(1);
+            let all: Vec<_> = GroupNumber::ALL
+                .iter()
+                .map(|&group| set(group, number, longest[group as usize - 1]))
+                .collect();
+            store.save(&as_changes(&all)).unwrap();
+            assert!(store.saves_left(&longest) >= left, "{left}");
+        }
+        store.make_room().unwrap();
+        assert!(store.saves_left(&longest) > 0);
+    }
+}
+
+/// A save reads only its own transaction again.
+#[test]
+fn after_every_save_the_store_knows_what_a_start_would_read() {
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut flash = MockFlash::<1024, 4>::new(2048, 0);
+    let pages = Pages::new(0, 1024);
+    let mut model = EMPTY;
+    for round in 0..100_u16 {
+        let mut store = start(&mut flash, pages).unwrap();
+        for step in 0..random.u16(1..9) {
+            let group = *random.choice(GroupNumber::ALL.iter()).unwrap();
+            let change = if random.u8(..5) == 0 {
+                restore(group)
+            } else {
+                set(group, round * 16 + step, random.usize(..60))
+            };
+            let changes = vec![change];
+            if store.save(&as_changes(&changes)).is_ok() {
+                model = after(&model, &changes);
+            }
+            for (group, expected) in GroupNumber::ALL.into_iter().zip(&model) {
+                let mut buf = [0; 64];
+                let loaded = store.load(group, &mut buf).unwrap();
+                let found = loaded.map(|loaded| (loaded.version, buf[..loaded.len].to_vec()));
+                assert_eq!(found, *expected, "{group:?}");
+            }
+        }
+        let known = (store.saves_left(&[9; 4]), store.moves());
+        let fresh = Store::prepare_within(View::open(&mut flash, pages).unwrap(), 0).unwrap();
+        assert_eq!((fresh.saves_left(&[9; 4]), fresh.moves()), known);
+    }
+}
+
+#[test]
+fn a_start_without_erases_keeps_everything_and_room_is_made_later() {
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
+    let mut store = start(&mut flash, PAGES).unwrap();
+    let mut last = 0;
+    while store.save(&application(&[last + 1])).is_ok() {
+        last += 1;
+    }
+    let erased = flash.erases().to_vec();
+    let view = View::open(&mut flash, PAGES).unwrap();
+    let mut store = Store::prepare_within(view, 0).unwrap();
+    assert_eq!((store.erases(), store.saves_left(&[16, 0, 1, 0])), (0, 0));
+    assert_eq!(store.save(&application(&[0])), Err(Error::Full));
+    let mut buf = [0; 1];
+    store.load(GroupNumber::Three, &mut buf).unwrap();
+    assert_eq!(buf, [last]);
+    store.make_room().unwrap();
+    store.save(&application(&[77])).unwrap();
+    store.load(GroupNumber::Three, &mut buf).unwrap();
+    assert_eq!((buf, store.erases()), ([77], 1));
+    assert_eq!(flash.erases().iter().sum::<u32>(), erased.iter().sum::<u32>() + 1);
 }
 
 #[test]
@@ -216,7 +325,7 @@ fn a_worn_out_word_fails_the_save_and_nothing_else() {
             match saved {
                 Ok(()) => assert_eq!(buf, [value * 2]),
                 Err(Error::Corrupt) => assert!(buf == [last] || buf == [value * 2], "old or new"),
-                Err(Error::RestartNeeded) => assert_eq!(buf, [last]),
+                Err(Error::Full) => assert_eq!(buf, [last]),
                 Err(error) => panic!("{error}"),
             }
             [last] = buf;

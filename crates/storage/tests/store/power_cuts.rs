@@ -39,6 +39,12 @@ fn scenario() -> Vec<Step> {
         Step::Restart,
         save(&[set(Three, 14, 33), set(One, 15, 4), restore(Four)]),
         save(&[set(Three, 16, 33)]),
+        Step::MakeRoom,
+        save(&[set(Three, 17, 60), set(Two, 18, 40)]),
+        Step::MakeRoom,
+        save(&[set(Four, 19, 50)]),
+        save(&[set(Four, 20, 50)]),
+        Step::MakeRoom,
     ]
 }
 

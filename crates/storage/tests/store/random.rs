@@ -22,7 +22,7 @@ fn changes() -> impl Strategy<Value = Changes> {
 }
 
 fn step() -> impl Strategy<Value = Step> {
-    prop_oneof![4 => changes().prop_map(Step::Save), 1 => Just(Step::Restart)]
+    prop_oneof![4 => changes().prop_map(Step::Save), 1 => Just(Step::Restart), 1 => Just(Step::MakeRoom)]
 }
 
 fn life() -> impl Strategy<Value = Life> {

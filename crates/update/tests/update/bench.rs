@@ -17,7 +17,7 @@ const APPLICATION_AREA: Area = Area::new(512, &[1024, 2048]);
 const STAGING_AREA: Area = Area::new(512 + 3072, &[2048, 2048]);
 const KEPT_AREA: Area = Area::new(512 + 3072 + 4096, &[2048, 2048]);
 
-pub(crate) const PRODUCT: u32 = 0x0001_8271;
+pub(crate) const BOARD: u32 = 0x0001_8271;
 pub(crate) const REVISION: u8 = 2;
 
 /// The first of the two keys that the test node trusts.
@@ -35,7 +35,7 @@ static PUBLIC_KEYS: LazyLock<[[u8; 32]; 2]> =
 
 pub(crate) fn target() -> Target {
     let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA, KEPT_AREA).unwrap();
-    Target { layout, product: PRODUCT, hardware: REVISION, keys: &*PUBLIC_KEYS }
+    Target { layout, board: BOARD, hardware: REVISION, keys: &*PUBLIC_KEYS }
 }
 
 /// A header and its code, as consistent as the test needs; [`Image::bytes`] are the bytes sent over the bus.
@@ -47,7 +47,7 @@ pub(crate) struct Image {
 
 pub(crate) fn description(version: u16, counter: u32) -> Description {
     let version = Version { major: version, minor: 2, patch: 3 };
-    Description { product: PRODUCT, hardware: 1 << REVISION, version, counter, ..Description::default() }
+    Description { board: BOARD, hardware: 1 << REVISION, version, counter, ..Description::default() }
 }
 
 impl Image {

@@ -1,7 +1,7 @@
 //! Images that must not run: each is refused with its code, and the application in place starts as before.
 
 use crate::bench::{
-    HEADER, Image, PRODUCT, REVISION, assert_starts, description, download, flash_with, image_a, image_b,
+    BOARD, HEADER, Image, REVISION, assert_starts, description, download, flash_with, image_a, image_b,
     key_number, keys, noise, run, target, update,
 };
 use update::{Area, CONTEXT, Description, Refusal, SIGNED_LEN, Status, Updater};
@@ -72,7 +72,7 @@ fn lengths() -> Vec<Kind> {
 
 fn headers() -> Vec<Kind> {
     let counter = Refusal::Counter { least: 5 };
-    let product = Refusal::Product { expected: PRODUCT };
+    let board = Refusal::Board { expected: BOARD };
     let hardware = Refusal::Hardware { revision: REVISION };
     vec![
         ("erased flash", vec![0xFF; 1200], Refusal::UnknownFormat),
@@ -95,7 +95,7 @@ fn headers() -> Vec<Kind> {
         ("the greatest length", header(put(24, u32::MAX - 3)), Refusal::TooLong),
         ("a length that is longer than the code", header(put(24, 624)), Refusal::Truncated),
         ("a length that is shorter than the code", header(put(24, 616)), Refusal::Excess),
-        ("another product", signed(|about| about.product += 1), product),
+        ("another board", signed(|about| about.board += 1), board),
         ("other hardware", signed(|about| about.hardware = !(1 << REVISION)), hardware),
         ("no hardware at all", signed(|about| about.hardware = 0), hardware),
         ("a lower security counter", signed(|about| about.counter = 4), counter),

@@ -7,9 +7,9 @@ use update::{Description, HEADER_LEN, Header, Refusal, SIGNATURE_LEN, SIGNED_LEN
 fn description() -> impl Strategy<Value = Description> {
     let version = any::<[u16; 3]>().prop_map(|[major, minor, patch]| Version { major, minor, patch });
     (any::<u32>(), any::<u32>(), version, any::<u32>(), 0..8_u8, any::<u8>()).prop_map(
-        |(product, hardware, version, counter, key, revokes)| {
+        |(board, hardware, version, counter, key, revokes)| {
             let revokes = revokes & !(1 << key);
-            Description { product, hardware, version, counter, key, revokes }
+            Description { board, hardware, version, counter, key, revokes }
         },
     )
 }
@@ -90,7 +90,7 @@ fn noise_is_no_header() {
 #[test]
 fn the_fields_are_where_the_table_says() {
     let version = Version { major: 0x0102, minor: 0x0304, patch: 0x0506 };
-    let numbers = Description { product: 0x1112_1314, hardware: 0x2122_2324, ..Description::default() };
+    let numbers = Description { board: 0x1112_1314, hardware: 0x2122_2324, ..Description::default() };
     let about = Description { version, counter: 0x3132_3334, key: 2, revokes: 0xA3, ..numbers };
     let header = Header::describe(about, b"123456781234").unwrap().with_signature([0xA5; 64]);
     let bytes = header.encode();

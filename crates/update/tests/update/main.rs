@@ -6,4 +6,5 @@ mod corrupted;
 mod header;
 mod ordinary;
 mod power_cuts;
+mod sequences;
 mod trial;

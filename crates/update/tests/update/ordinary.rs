@@ -17,6 +17,7 @@ fn from_a_to_b_and_back() {
     for image in [image_b(), image_a(), image_b()] {
         update(&mut flash, &image.bytes()).unwrap();
         assert_starts(&mut flash, &image);
+        confirm(&mut flash);
     }
 }
 
@@ -179,6 +180,7 @@ fn the_security_counter_may_grow_or_stay_and_never_goes_back() {
     let with = |version, counter| Image::new(description(version, counter), 100);
     for (image, good) in [(with(3, 5), true), (with(4, 9), true), (with(5, 8), false), (with(6, 9), true)] {
         assert_eq!(update(&mut flash, &image.bytes()).is_ok(), good);
+        confirm(&mut flash);
     }
     assert_starts(&mut flash, &with(6, 9));
 }
@@ -240,8 +242,8 @@ fn either_key_signs_and_one_revokes_the_other_for_good() {
     for image in [by_key(2, 1, 0), by_key(3, 0, 0), by_key(4, 1, 1)] {
         update(&mut flash, &image.bytes()).unwrap();
         assert_starts(&mut flash, &image);
+        confirm(&mut flash);
     }
-    confirm(&mut flash);
     assert_starts(&mut flash, &by_key(4, 1, 1));
     // From the start of the fourth image on, the first key is revoked, whatever happens to that image.
     for image in [by_key(3, 0, 0), by_key(5, 0, 2)] {

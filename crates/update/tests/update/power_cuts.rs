@@ -1,8 +1,8 @@
 //! Power cuts at every flash operation of whole updates, and again in the recovery.
 
 use crate::bench::{
-    Image, SECTORS, chance, flash_of_words_with, flash_with, holds, image_a, image_b, install, is_thorough,
-    stage, start, update,
+    Image, SECTORS, chance, confirm, flash_of_words_with, flash_with, holds, image_a, image_b, install,
+    is_thorough, stage, start, update,
 };
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Refusal, Stay};
@@ -189,6 +189,7 @@ fn a_cut_in_the_update_that_follows_a_cut_loses_nothing() {
             assert!(update(&mut flash, &case.new.bytes()).is_err());
             flash.power_up();
             case.settle(&mut flash);
+            confirm(&mut flash);
             cuts += 1;
         }
     }

@@ -89,13 +89,43 @@ fn a_restart_that_another_start_decides_is_no_start() {
 }
 
 #[test]
-fn of_two_images_that_nobody_has_confirmed_the_one_before_both_comes_back() {
-    let mut flash = b_on_trial(1);
+fn the_next_update_is_refused_until_the_trial_is_decided() {
     let image_c = Image::new(description(3, 5), 804);
+    let mut flash = b_on_trial(1);
+    let before = flash.bytes();
+    assert_eq!(update(&mut flash, &image_c.bytes()), Err(Refusal::OnTrial));
+    assert!(flash.bytes() == before, "nothing is changed");
+    let mut confirmed = flash.clone();
+    confirm(&mut confirmed);
+    update(&mut confirmed, &image_c.bytes()).unwrap();
+    assert_starts(&mut confirmed, &image_c);
+    withdraw(&mut confirmed);
+    assert_starts(&mut confirmed, &image_b());
+    withdraw(&mut flash);
+    assert_eq!(update(&mut flash, &image_c.bytes()), Err(Refusal::OnTrial), "the return is not complete");
+    assert_starts(&mut flash, &image_a());
     update(&mut flash, &image_c.bytes()).unwrap();
-    assert_starts(&mut flash, &image_c);
     withdraw(&mut flash);
     assert_starts(&mut flash, &image_a());
+}
+
+/// The application area cannot be programmed: the node has a program again after the next start.
+#[test]
+fn a_copy_that_fails_brings_the_kept_image_back() {
+    let mut flash = flash_with(&image_a(), 1);
+    stage(&mut flash, &image_b().bytes()).unwrap();
+    let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
+    updater.install().unwrap();
+    let application = target().layout.application().start() as usize;
+    while updater.flash().bytes()[application..application + 1024].iter().any(|byte| *byte != 0xFF) {
+        updater.poll();
+    }
+    // A cell that does not erase.
+    updater.flash().disturb(application + 600, |_| 0);
+    assert_eq!(run(&mut updater), Err(Refusal::Unspecified));
+    assert_eq!(updater.status().code, Refusal::NotCleared.code());
+    assert_starts(&mut flash, &image_a());
+    assert_eq!(trial(&mut flash), Trial::Over(Reason::Withdrawn));
 }
 
 /// The counter of an image applies from its confirmation on; otherwise a failed trial could not return to the previous

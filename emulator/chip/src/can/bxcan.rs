@@ -81,6 +81,8 @@ pub struct BxCan {
     reception: Reception,
     /// Cycles of the peripheral's clock between RFOM and the next frame in the output mailbox.
     release: u32,
+    /// The controller acknowledges no other mode until a reset.
+    is_held: bool,
     poke: bool,
 }
 
@@ -113,6 +115,7 @@ impl BxCan {
             status: Status::default(),
             reception: Reception::default(),
             release: RELEASE,
+            is_held: false,
             poke: false,
         }
     }
@@ -123,6 +126,11 @@ impl BxCan {
         monitor.cancel();
         let (reception, release) = (self.reception, self.release);
         *self = BxCan { monitor, reception, release, poke: true, ..BxCan::new(self.slave, self.clock) };
+    }
+
+    /// Holds the controller in its mode until a reset.
+    pub(crate) fn hold(&mut self) {
+        self.is_held = true;
     }
 
     /// CAN_BTR.

@@ -26,11 +26,13 @@ pub enum FaultKind {
     WrongCode,
     /// No battery, or an empty one, at VBAT: a loss of the main supply is also a loss of the backup domain's supply.
     BatteryEmpty,
+    /// No battery, and a main supply that returns soon: the backup SRAM has lost some of its bits.
+    BatteryWeak,
     /// The clock on OSC_IN has stopped.
     NoCrystal,
 }
 
-const NAMES: [(&str, FaultKind); 10] = [
+const NAMES: [(&str, FaultKind); 11] = [
     ("open-sensor", FaultKind::OpenSensor),
     ("rail-high", FaultKind::RailHigh),
     ("rail-low", FaultKind::RailLow),
@@ -40,6 +42,7 @@ const NAMES: [(&str, FaultKind); 10] = [
     ("open-ssi", FaultKind::OpenSsi),
     ("wrong-code", FaultKind::WrongCode),
     ("battery-empty", FaultKind::BatteryEmpty),
+    ("battery-weak", FaultKind::BatteryWeak),
     ("no-crystal", FaultKind::NoCrystal),
 ];
 
@@ -66,6 +69,7 @@ impl FaultKind {
             FaultKind::OpenSsi => "absolute encoder: broken data line",
             FaultKind::WrongCode => "absolute encoder: half a revolution off",
             FaultKind::BatteryEmpty => "battery: empty",
+            FaultKind::BatteryWeak => "battery: too weak, the memory loses bits",
             FaultKind::NoCrystal => "crystal: stopped",
         }
     }

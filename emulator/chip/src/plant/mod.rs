@@ -212,6 +212,11 @@ impl Plant {
         !self.has(FaultKind::BatteryEmpty, now)
     }
 
+    /// Whether the backup SRAM loses some of its bits without the main supply.
+    pub(crate) fn has_weak_battery(&self, now: Time) -> bool {
+        self.has(FaultKind::BatteryWeak, now)
+    }
+
     /// Whether OSC_IN has a clock.
     pub(crate) fn has_crystal(&self, now: Time) -> bool {
         !self.has(FaultKind::NoCrystal, now)

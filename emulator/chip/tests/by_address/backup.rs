@@ -102,6 +102,18 @@ fn an_empty_battery_keeps_nothing() {
 }
 
 #[test]
+fn a_weak_battery_loses_some_bits() {
+    let mut rig = rig();
+    let words = [0, 4, 8, 12, 16].map(|offset| BKPSRAM + offset);
+    words.iter().for_each(|&word| rig.write(word, 0));
+    rig.chip.plant_mut(rig.now).add_fault("battery-weak@0".parse().expect("a fault"));
+    cycle(&mut rig, false);
+    assert_eq!(words.map(|word| rig.read(word)), [0; 5], "the main supply is there");
+    cycle(&mut rig, true);
+    assert_eq!(words.map(|word| rig.read(word)), [0, 0x80, 0, 0, 0x80]);
+}
+
+#[test]
 fn what_a_battery_has_kept_can_be_taken_out_and_put_back() {
     let mut first = rig();
     first.write(BKPSRAM + 0x10, 0xCAFE_F00D);

@@ -25,6 +25,8 @@ struct Program {
     wait_states: u32,
     pll: u32,
     prescalers: u32,
+    /// The time between the dividers and the switch to the PLL.
+    divided_for: canbus::Time,
     backup_writable: bool,
     port_b_clock: bool,
     can_function: u32,
@@ -43,6 +45,7 @@ const RIGHT: Program = Program {
     wait_states: 4,
     pll: PLL_144,
     prescalers: PRESCALERS,
+    divided_for: canbus::Time::from_micros(1),
     backup_writable: true,
     port_b_clock: true,
     can_function: 9,
@@ -71,6 +74,8 @@ impl Program {
         rig.write(PLLCFGR, self.pll);
         rig.write(RCC, 0x0105_0083);
         rig.wait(canbus::Time::from_micros(200));
+        rig.write(CFGR, self.prescalers);
+        rig.wait(self.divided_for);
         rig.write(CFGR, self.prescalers | 0b10);
         rig.wait(canbus::Time::from_micros(10));
     }
@@ -176,6 +181,16 @@ fn every_seeded_bug_is_told() {
             "PA0 is not switched to analogue",
         ),
         (
+            "the PLL at once",
+            Program { divided_for: canbus::Time::ZERO, ..RIGHT },
+            "the system clock is switched 0 cycles after a divider",
+        ),
+        (
+            "the PLL half a microsecond later",
+            Program { divided_for: canbus::Time(canbus::Time::PER_MICRO / 2), ..RIGHT },
+            "the system clock is switched 8 cycles after a divider",
+        ),
+        (
             "a protected backup domain",
             Program { backup_writable: false, ..RIGHT },
             "BKPSRAM is written while the backup domain is protected",
@@ -195,4 +210,24 @@ fn a_breach_is_told_once() {
     }
     assert_eq!(rig.chip.breach(), Some(Breach::ClockOff { name: "CAN1" }));
     assert_eq!(rig.chip.breach(), None);
+}
+
+const DBGMCU_CR: u32 = 0xE004_2004;
+
+/// In RAM, at a multiple of eight, or without DBG_SLEEP a WFI is safe.
+#[test]
+fn a_sleep_in_flash_is_told_where_a_debugger_makes_it_unsafe() {
+    for (debugs, address, is_safe) in [
+        (1, 0x0802_0208, true),
+        (1, 0x0802_020A, false),
+        (1, 0x0802_020C, false),
+        (1, 0x2000_6004, true),
+        (0, 0x0802_020C, true),
+    ] {
+        let mut rig = Rig::new();
+        rig.write(DBGMCU_CR, debugs);
+        rig.chip.slept(address);
+        let expected = (!is_safe).then_some(Breach::Sleep { address });
+        assert_eq!(rig.chip.breach(), expected, "{address:08X}h");
+    }
 }

@@ -92,7 +92,7 @@ impl Client {
                 Action::Segment(text) => self.outbox.segment(&text),
                 Action::Stream(text) => self.outbox.stream(&text),
                 Action::Attach(adapter) => world.port(self.port).attach(Some(adapter)),
-                Action::Detach => world.port(self.port).attach(None),
+                Action::Detach => world.port(self.port).detach_when_sent(),
                 Action::Send(frame) => world.port(self.port).send(frame, now),
             }
         }

@@ -4,26 +4,30 @@ use std::collections::VecDeque;
 
 use canopen::dictionary::Object;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use node::{BitRate, Measurement, Personality, Protocol, Setup, State, StoreJob};
+use node::{
+    BitRate, EraseBudget, Measurement, ParameterMemory, Personality, Protocol, Setup, State, StoreJob,
+};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample, Retained};
-use storage::{DeviceRecord, Pages, Store, View};
+use storage::{DeviceRecord, Pages, View};
 
 use super::flash::{Flash, PAGE};
-use super::step::{Step, raw};
+use super::step::{LONGEST_QUEUE, Step, raw};
+use super::watch::Watch;
 
 const PAGES: Pages = Pages::new(0, PAGE);
-/// Frames in the transmit queue, as in the firmware.
-const ROOM: usize = 32;
 /// A chip whose temperature sensor is calibrated.
 const CHIP: ChipThermometer = ChipThermometer { offset: 24.6, slope: 444.0 };
+/// The longest erase of a page.
+const ERASE: Duration = Duration::from_millis(500);
 /// Limit of the requests that a call can leave.
 const REQUESTS: usize = 16;
 
 /// A transmit queue with limited space.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Queue {
     waiting: Vec<Frame>,
     is_congested: bool,
+    length: usize,
 }
 
 impl Transmit for Queue {
@@ -36,7 +40,7 @@ impl Transmit for Queue {
     }
 
     fn room(&self) -> usize {
-        ROOM - self.waiting.len()
+        self.length - self.waiting.len()
     }
 }
 
@@ -48,7 +52,7 @@ pub(super) struct Board {
     pub(super) protocol: Protocol,
     measurement: Measurement,
     flash: Flash,
-    store: Option<Store<Flash>>,
+    memory: Option<ParameterMemory<Flash>>,
     pub(super) out: Queue,
     pub(super) now: Instant,
     pub(super) due: Instant,
@@ -57,6 +61,7 @@ pub(super) struct Board {
     has_parameters: bool,
     /// Whether the node has started since the last step.
     pub(super) has_started: bool,
+    watch: Watch,
 }
 
 impl Board {
@@ -76,14 +81,15 @@ impl Board {
             protocol: Protocol::new(&unless_stored),
             measurement: Measurement::new(personality, &PowerOn::default()),
             flash: Flash::erased(),
-            store: None,
-            out: Queue::default(),
+            memory: None,
+            out: Queue { waiting: vec![], is_congested: false, length: LONGEST_QUEUE },
             now: Instant(0),
             due: Instant(0),
             filters: [vec![], vec![]],
             actions: VecDeque::new(),
             has_parameters: false,
             has_started: false,
+            watch: Watch::new(personality, None),
         };
         board.power_on(Retained::Nothing);
         board.settle();
@@ -95,9 +101,9 @@ impl Board {
     fn power_on(&mut self, retained: Retained) {
         self.out.waiting.clear();
         self.actions.clear();
-        self.store = None;
+        self.memory = None;
         let mut parameters = self.protocol.parameters();
-        while self.store.is_none() {
+        while self.memory.is_none() {
             self.flash.power_up();
             let mut view = View::open(self.flash.clone(), PAGES).expect("there is power");
             let record = view.device().expect("there is power");
@@ -105,13 +111,16 @@ impl Board {
             self.personality = setup.personality;
             self.protocol = Protocol::new(&setup);
             parameters = self.protocol.load(&mut view);
-            self.store = Store::prepare(view).ok();
+            self.memory = ParameterMemory::prepare(view, EraseBudget::new(None)).ok();
         }
+        self.show_memory();
         self.measurement = Measurement::new(
             self.personality,
             &PowerOn { thermometer: CHIP, retained, ..PowerOn::default() },
         );
         self.measurement.apply(&parameters);
+        self.watch = Watch::new(self.personality, None);
+        self.watch.starts(self.now);
         self.start();
     }
 
@@ -127,6 +136,7 @@ impl Board {
 
     fn start(&mut self) {
         self.out.waiting.clear();
+        self.watch.restarts(self.now);
         let next = self.protocol.start(self.now, &mut self.out);
         self.keep(next);
         self.has_started = true;
@@ -153,7 +163,17 @@ impl Board {
 
     /// The frames that were sent.
     pub(super) fn sent(&mut self) -> Vec<Frame> {
-        if self.out.is_congested { vec![] } else { std::mem::take(&mut self.out.waiting) }
+        if self.out.is_congested {
+            return vec![];
+        }
+        let frames = std::mem::take(&mut self.out.waiting);
+        frames.iter().for_each(|frame| self.watch.sent(self.now, frame));
+        frames
+    }
+
+    /// Starts with a new monitor: frames were lost, or the bus has stopped the node.
+    fn watch_anew(&mut self) {
+        self.watch = Watch::new(self.personality, self.node_id());
     }
 
     /// Carries out one step and all its consequences at this instant.
@@ -162,7 +182,7 @@ impl Board {
         match *step {
             Step::Sdo(data) => self.sdo(data),
             Step::Read { row } => self.sdo(upload(self.row(row))),
-            Step::Write { row, value } => self.sdo(download(self.row(row), value)),
+            Step::Write { row, value } => self.sdo(download(self.row(row), Step::download(row, value))),
             Step::Nmt { command, to_all } => self.nmt(command, to_all),
             Step::Process { place, len, remote, data } => {
                 self.receive(pick(&self.filters[0], place), len, remote, data);
@@ -175,10 +195,15 @@ impl Board {
             }
             Step::Bus(report) => {
                 let _ = self.protocol.bus_event(report.into(), self.now);
+                self.watch_anew();
             }
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
-            Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
+            Step::Congest(congestion) => {
+                let (is_congested, length) = Step::queue(congestion);
+                self.out = Queue { waiting: vec![], is_congested, length };
+                self.watch_anew();
+            }
             Step::PowerCycle => self.power_on(self.retained()),
             Step::PowerCut { after } => self.flash.cut_after(after),
         }
@@ -203,6 +228,9 @@ impl Board {
         let id = id & 0x7FF;
         let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data[..usize::from(len)]) };
         let frame = frame.expect("an identifier of 11 bits and at most eight bytes");
+        if self.filters.iter().flatten().any(|passed| *passed == id) {
+            self.watch.received(self.now, &frame);
+        }
         if self.filters[0].contains(&id) {
             let _ = self.protocol.on_process_frame(&frame, self.now, &mut self.out);
         }
@@ -266,12 +294,22 @@ impl Board {
 
     fn run_job(&mut self) {
         let mut job = StoreJob::new(Personality::default());
-        let Some(store) = self.store.as_mut().filter(|_| self.protocol.take_job(&mut job)) else { return };
-        let result = job.run(store);
+        let Some(memory) = self.memory.as_mut().filter(|_| self.protocol.take_job(&mut job)) else { return };
+        let result = memory.run(&mut job);
+        if memory.can_make_room(self.now) && self.protocol.can_pause(ERASE, self.now) {
+            let _ = memory.make_room();
+        }
         if self.flash.is_down() {
             return self.power_on(Retained::Nothing);
         }
+        self.show_memory();
         let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
+    }
+
+    fn show_memory(&mut self) {
+        if let Some(memory) = &self.memory {
+            self.protocol.show_memory(memory.state());
+        }
     }
 }
 

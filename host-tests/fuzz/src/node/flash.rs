@@ -6,8 +6,8 @@ use std::rc::Rc;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use storage::mock::{MockFlash, PowerCut, Weak};
 
-/// Page size: small, so that a few saves fill a page.
-pub(super) const PAGE: u32 = 4 * 1024;
+/// Page size of the board (memory.x).
+pub(super) const PAGE: u32 = 16 * 1024;
 const ERASE: usize = PAGE as usize;
 
 /// The flash.

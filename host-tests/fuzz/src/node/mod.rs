@@ -5,6 +5,7 @@ mod board;
 mod flash;
 mod rules;
 mod step;
+mod watch;
 
 use arbitrary::Unstructured;
 use node::Personality;

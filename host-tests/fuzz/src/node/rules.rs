@@ -32,10 +32,10 @@ pub(super) fn check(step: &Step, before: Seen, board: &mut Board) {
         is_allowed(frame, [before, after], board);
     }
     if let Step::Write { row, value } = step {
-        let row = board.row(*row);
+        let (row, value) = (board.row(*row), Step::download(*row, *value));
         let is_accepted = sent.iter().any(|frame| is_answer(frame, after, DOWNLOADED, row));
         if is_accepted && !board.has_started {
-            reads_back(row, *value, after, board);
+            reads_back(row, value, after, board);
         }
     }
 }

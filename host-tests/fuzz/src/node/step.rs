@@ -4,6 +4,9 @@ use arbitrary::Arbitrary;
 use node::BusEvent;
 use profiles::board::RawSample;
 
+/// Frames in the transmit queue of the firmware.
+pub(super) const LONGEST_QUEUE: usize = 32;
+
 /// One event.
 #[derive(Arbitrary, Debug)]
 pub(super) enum Step {
@@ -11,7 +14,7 @@ pub(super) enum Step {
     Sdo([u8; 8]),
     /// An SDO upload of a row of the dictionary.
     Read { row: u16 },
-    /// An expedited SDO download to a row of the dictionary, with the length of the object.
+    /// An expedited SDO download to a row of the dictionary, with the length of the object ([`Step::download`]).
     Write { row: u16, value: [u8; 4] },
     /// A defined NMT command.
     Nmt { command: u8, to_all: bool },
@@ -31,12 +34,29 @@ pub(super) enum Step {
     Deadline,
     /// Time passes, in us, beyond any deadlines.
     Wait(u32),
-    /// The bus stops taking frames, or takes frames again.
-    Congest(bool),
+    /// The bus stops taking frames, or takes frames again, with a queue of any length ([`Step::queue`]).
+    Congest(u8),
     /// Power off and on.
     PowerCycle,
     /// A power cut, after `after` further flash operations.
     PowerCut { after: u8 },
+}
+
+impl Step {
+    /// The value of a download: the given one, one that switches a PDO off, or 0, which deselects.
+    pub(super) fn download(row: u16, value: [u8; 4]) -> [u8; 4] {
+        match row >> 12 {
+            15 => [0; 4],
+            14 => [value[0], value[1], 0, 0x80],
+            _ => value,
+        }
+    }
+
+    /// Whether the bus takes no frames, and the length of the queue: that of the firmware, or a shorter one.
+    pub(super) fn queue(congestion: u8) -> (bool, usize) {
+        let length = usize::from(congestion >> 1) % LONGEST_QUEUE;
+        (congestion & 1 == 1, if length == 0 { LONGEST_QUEUE } else { length })
+    }
 }
 
 /// A [`BusEvent`] for the fuzzer.

@@ -88,6 +88,7 @@ const FLASH_KEYR: u32 = 0x4002_3C04;
 const FLASH_CR: u32 = 0x4002_3C10;
 const GPIOA: u32 = 0x4002_0000;
 const GPIOB: u32 = 0x4002_0400;
+const OSPEEDR: u32 = 0x08;
 const AFRL: u32 = 0x20;
 const AFRH: u32 = 0x24;
 const CAN1: u32 = 0x4000_6400;
@@ -182,6 +183,14 @@ pub(super) const STORES: &[Row] = &[
     wrong("SSI clock idles low", SPI2, 1 << 1, 0, "the position is").with(Node::Absolute),
     wrong("SSI sampled at the first edge", SPI2, 1 << 0, 0, "the position is").with(Node::Absolute),
     wrong("SSI clock too fast", SPI2, 0b111 << 3, 0, "the SSI clock at 18000000 Hz").with(Node::Absolute),
+    wrong(
+        "SSI clock pin at the lowest speed",
+        GPIOB + OSPEEDR,
+        0b11 << 26,
+        0,
+        "PB13 has the lowest output speed",
+    )
+    .with(Node::Absolute),
     wrong("SPI without DMA", SPI2 + 0x04, 0b11, 0, "the position is").with(Node::Absolute),
     missing("flags of DMA1 are not cleared", DMA1 + 0x08, "stream 3 of DMA1 begins with flags")
         .with(Node::Absolute),
@@ -210,6 +219,13 @@ pub(super) const CODE: &[Row] = &[
         RECEPTION,
         &[0xB672, 0xBF30, 0xE7FD],
         "reset by the chip (watchdog)",
+    ),
+    // wfi; wfi; b .-4: one of the two is at no multiple of eight.
+    code(
+        "a sleep at any address in flash",
+        SAMPLING,
+        &[0xBF30, 0xBF30, 0xE7FC],
+        "in flash with DBG_SLEEP set",
     ),
     // udf #0
     code("an undefined instruction", SAMPLING, &[0xDE00], "CFSR 0x10000"),

@@ -92,6 +92,32 @@ fn a_node_without_a_program_takes_one_from_the_holder_of_its_key_alone() {
     assert_eq!(state(&mut bench), CLOSED, "the program has a challenge of its own");
 }
 
+/// A write of every length to every entry of the bootloader: what has an effect on the program is refused, and nothing
+/// else can be written but the heartbeat time.
+#[test]
+fn a_closed_bootloader_accepts_no_write_with_an_effect_on_the_program() {
+    const ABSENT: u32 = 0x0602_0000;
+    let mut bench = empty();
+    let mut outcomes = Vec::new();
+    for index in 0x1000..0x3000 {
+        let object = Multiplexer { index, sub: 0 };
+        if bench.read(object) == Err(Failure::Refused(ABSENT)) {
+            continue;
+        }
+        for at in (0..9).map(|sub| Multiplexer { index, sub }) {
+            let results = [1, 2, 4, 8].map(|len| Client::new(&mut bench).write(at, &vec![3; len]));
+            if results.contains(&Ok(())) {
+                outcomes.push((at.index, at.sub, "accepted"));
+            } else if results.contains(&Err(refused(Abort::DeviceState))) {
+                outcomes.push((at.index, at.sub, "refused"));
+            }
+        }
+    }
+    let expected = [(0x1017, 0, "accepted"), (0x1F50, 1, "refused"), (0x1F51, 1, "refused")];
+    assert_eq!(outcomes, expected);
+    assert_eq!(state(&mut bench), CLOSED);
+}
+
 #[test]
 fn a_machine_is_stopped_by_the_holder_of_the_key_alone_and_its_bootloader_is_open_then() {
     let mut bench = running();
@@ -100,6 +126,10 @@ fn a_machine_is_stopped_by_the_holder_of_the_key_alone_and_its_bootloader_is_ope
         assert_eq!(bench.command(command), Err(refused(Abort::DeviceState)));
     }
     assert_eq!(Client::new(&mut bench).write(TRIAL_COMMAND, b"back"), Err(refused(Abort::DeviceState)));
+    for sub in [3, 4] {
+        let time = Multiplexer { index: 0x2002, sub };
+        assert_eq!(Client::new(&mut bench).write(time, &[1, 0]), Err(refused(Abort::DeviceState)));
+    }
     assert!(bench.is_running());
     let right = response(&mut bench);
     answer(&mut bench, right).unwrap();

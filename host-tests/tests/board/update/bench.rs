@@ -18,6 +18,7 @@ pub(super) const DATA: Multiplexer = Multiplexer { index: 0x1F50, sub: 1 };
 pub(super) const CONTROL: Multiplexer = Multiplexer { index: 0x1F51, sub: 1 };
 pub(super) const IDENTIFICATION: Multiplexer = Multiplexer { index: 0x1F56, sub: 1 };
 pub(super) const STATUS: Multiplexer = Multiplexer { index: 0x1F57, sub: 1 };
+pub(super) const TRIAL_COMMAND: Multiplexer = Multiplexer { index: 0x2002, sub: 2 };
 pub(super) const DEVICE_TYPE: Multiplexer = Multiplexer { index: 0x1000, sub: 0 };
 /// 'BOOT'.
 pub(super) const BOOT: [u8; 4] = 0x424F_4F54_u32.to_le_bytes();
@@ -178,6 +179,12 @@ impl Bench {
         panic!("the program does not run: 1F51h reads {:?}", self.read(CONTROL));
     }
 
+    /// Confirms the program on trial.
+    pub(crate) fn confirm(&mut self) {
+        Client::new(self).write(TRIAL_COMMAND, b"conf").unwrap();
+        self.run(Time::from_millis(100));
+    }
+
     /// The complete update sequence of a master.
     pub(crate) fn update(&mut self, image: &Image) {
         self.stop();
@@ -240,7 +247,7 @@ pub(super) fn version_b(length: usize) -> Image {
 /// Code that is not meant to run, in a valid image except for the change.
 pub(super) fn signed(code: Vec<u8>, change: impl FnOnce(&mut Description)) -> Image {
     let mut about = Description {
-        product: product::PRODUCT,
+        board: product::BOARD,
         hardware: product::HARDWARE,
         version: VERSION_B,
         ..Description::default()

@@ -4,6 +4,8 @@
 use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
+use host_tests::watch::expects;
+use monitor::Rule;
 use sign::image::Image;
 use update::{Description, HEADER_LEN, SIGNED_LEN};
 
@@ -15,7 +17,7 @@ type Kind = (&'static str, Vec<u8>, u8);
 const UNKNOWN_FORMAT: u8 = 2;
 const CRC: u8 = 3;
 const TOO_LONG: u8 = 6;
-const PRODUCT: u8 = 64;
+const BOARD: u8 = 64;
 const HARDWARE: u8 = 65;
 const SIGNATURE: u8 = 67;
 const TRUNCATED: u8 = 68;
@@ -96,7 +98,7 @@ fn headers() -> Vec<Kind> {
         ("a bit of the header's CRC", bytes(flip(HEADER_LEN - 1)), CRC),
         ("reserved bytes in use", header(put(300, 1)), CRC),
         ("no code by the header", header(put(24, 0)), CRC),
-        ("another product", about(|about| about.product += 1), PRODUCT),
+        ("another board", about(|about| about.board += 1), BOARD),
         ("other hardware", about(|about| about.hardware = 2), HARDWARE),
     ]
 }
@@ -126,6 +128,7 @@ fn contents() -> Vec<Kind> {
 
 #[test]
 fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
+    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = Bench::running();
     let before = bench.application();
     bench.stop();
@@ -146,12 +149,14 @@ fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
 /// Only the security counter of a confirmed image is in force, so the test takes two updates.
 #[test]
 fn an_image_with_a_lower_counter_is_refused() {
+    let _expected = expects([Rule::SdoProtocol]);
     const COUNTER: u8 = 66;
     let code = version_a().code;
     let newer = signed(code.clone(), |about| about.counter = 3);
     let older = signed(code[..LENGTH].to_vec(), |about| about.counter = 2);
     let mut bench = Bench::running();
     bench.update(&newer);
+    bench.confirm();
     bench.stop();
     bench.clear();
     let _ = bench.download(&older.to_bytes());

@@ -5,11 +5,13 @@ use canopen::sdo::Multiplexer;
 use host_tests::sdo::{Client, Failure};
 
 use super::bench::{BOOT, Bench, CLEAR, CONTROL, DATA, DEVICE_TYPE, START, signed, version_a};
+use super::fleet::PERSONALITIES;
 use crate::support::{Master, SECOND};
 
 const NMT: u16 = 0x000;
 const RESET_NODE: u8 = 0x81;
 const RESET_COMMUNICATION: u8 = 0x82;
+const BOARD: Multiplexer = Multiplexer { index: 0x2004, sub: 1 };
 const HEARTBEAT: Multiplexer = Multiplexer { index: 0x1017, sub: 0 };
 /// SDO abort codes (CiA 301, table 22).
 const INVALID_VALUE: Failure = Failure::Refused(0x0609_0030);
@@ -27,16 +29,22 @@ fn in_bootloader() -> Bench {
 }
 
 #[test]
-fn it_says_who_it_is() {
-    let mut bench = Bench::running();
-    let identity = |bench: &mut Bench| [1, 2, 3, 4].map(|sub| bench.word(at(0x1018, sub)));
-    let before = identity(&mut bench);
-    bench.stop();
-    assert_eq!(identity(&mut bench), before, "the same node as before");
-    assert_eq!(bench.read(at(0x1001, 0)).unwrap(), [0]);
-    assert_eq!(bench.read(at(0x1008, 0)).unwrap(), b"Bootloader");
-    assert_eq!(bench.read(at(0x1009, 0)).unwrap(), b"NUCLEO-F446RE");
-    assert_eq!(bench.read(at(0x100A, 0)).unwrap(), env!("CARGO_PKG_VERSION").as_bytes());
+fn it_has_the_identity_of_the_application_in_every_personality() {
+    for (personality, node) in PERSONALITIES.into_iter().zip([1, 16, 127, 2]) {
+        let flags = format!("--bitrate 1000 --node {node}:{personality}");
+        let mut bench = Bench::new(&flags, 1_000_000, node);
+        bench.run(SECOND);
+        let identity = |bench: &mut Bench| [1, 2, 3, 4].map(|sub| bench.word(at(0x1018, sub)));
+        let before = (identity(&mut bench), bench.word(BOARD));
+        bench.stop();
+        let after = (identity(&mut bench), bench.word(BOARD));
+        assert_eq!(after, before, "{personality}: the same node as before");
+        assert_eq!(after.1, product::BOARD);
+        assert_eq!(bench.read(at(0x1001, 0)).unwrap(), [0]);
+        assert_eq!(bench.read(at(0x1008, 0)).unwrap(), b"Bootloader");
+        assert_eq!(bench.read(at(0x1009, 0)).unwrap(), b"NUCLEO-F446RE");
+        assert_eq!(bench.read(at(0x100A, 0)).unwrap(), env!("CARGO_PKG_VERSION").as_bytes());
+    }
 }
 
 #[test]

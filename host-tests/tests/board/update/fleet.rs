@@ -3,16 +3,19 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use canbus::Time;
 use clap::Parser;
 use host_tests::thorough::either;
+use host_tests::watch::expects;
+use monitor::Rule;
 use nodectl::cli::Cli;
 use serde_json::{Value, json};
 use sign::image::Image;
 use sim::world::World;
 
-use super::bench::{VERSION_B, version_a, version_b};
+use super::bench::{Bench, VERSION_B, signed, version_a, version_b};
 pub(super) use crate::adapter::Shared;
 use crate::adapter::run;
 use crate::support::{SECOND, world};
@@ -55,6 +58,8 @@ impl Outage {
     }
 }
 
+pub(super) const PERSONALITIES: [&str; 4] = ["pressure", "encoder", "combined", "lift"];
+
 pub(super) fn boards(count: u8) -> Shared {
     let nodes: String = (1..=count).map(|node| format!(" --node {node}:pressure")).collect();
     share(world(&format!("--bitrate 1000{nodes}")))
@@ -64,6 +69,10 @@ pub(super) fn boards(count: u8) -> Shared {
 pub(super) fn share(mut world: World) -> Shared {
     world.run_until(SECOND);
     Rc::new(RefCell::new(world))
+}
+
+fn unshare(world: Shared) -> World {
+    Rc::into_inner(world).expect("no adapter is left").into_inner()
 }
 
 /// Runs `nodectl update --force` (A is the older version). Returns its reports, one for each node, in the order of the
@@ -80,7 +89,9 @@ pub(super) fn try_update(
     mut outage: Option<Outage>,
     more: &[&str],
 ) -> Result<Vec<Value>, String> {
-    let name = format!("{nodes}-{:08X}-{}.img", image.header.code_crc(), std::process::id());
+    // Tests may run at the same time in one process.
+    static FILES: AtomicU32 = AtomicU32::new(0);
+    let name = format!("{}-{}.img", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::write(&file, image.to_bytes()).unwrap();
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
@@ -116,6 +127,77 @@ fn nodectl_updates_to_b_and_back() {
     assert_eq!(b.header.description().version, VERSION_B);
     assert_eq!(update(&world, "1", &b, None), [updated(1, [&a, &b])]);
     assert_eq!(update(&world, "1", &a, None), [updated(1, [&b, &a])]);
+}
+
+/// Every personality at node-IDs 1, 16 and 127, at a bit rate of a sample: one image serves all of them.
+#[test]
+fn one_image_updates_every_personality() {
+    let kbits = [1000, 500, 250, 125];
+    let cases = PERSONALITIES.into_iter().zip([1, 16, 127, 1]).zip(kbits);
+    for ((personality, node), kbit) in cases {
+        let flags = format!("--bitrate {kbit} --node {node}:{personality}");
+        let world = share(world(&flags));
+        let (a, b) = (version_a(), version_b(0));
+        // `nodectl_updates_to_b_and_back` has the way back in each run.
+        for [from, to] in either(vec![[&a, &b]], vec![[&a, &b], [&b, &a]]) {
+            assert_eq!(update(&world, &node.to_string(), to, None), [updated(node, [from, to])], "{flags}");
+        }
+    }
+}
+
+/// Runs a command of `nodectl` on a node; returns its report or the error.
+fn nodectl(world: &Shared, node: u8, command: &str) -> Result<Value, String> {
+    let node = node.to_string();
+    let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", &node, command];
+    let (printed, result) = run(world, &Cli::try_parse_from(line).unwrap(), |_| ());
+    result.map_err(|failure| failure.to_string())?;
+    Ok(serde_json::from_str(&printed).unwrap())
+}
+
+#[test]
+fn nodectl_confirms_a_program_on_trial_or_rolls_it_back() {
+    let (a, b) = (version_a(), version_b(0));
+    let all: Vec<_> = PERSONALITIES.into_iter().zip([1000, 125, 250, 500]).collect();
+    for (personality, kbit) in either(vec![all[0], all[3]], all) {
+        let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
+        for command in ["confirm", "rollback"] {
+            assert_eq!(nodectl(&world, 16, command).unwrap_err(), "node 16: its program is not on trial");
+        }
+        let left = ["--no-confirm"];
+        for (command, result, runs) in [("rollback", "rolled back", &a), ("confirm", "confirmed", &b)] {
+            let reports = try_update(&world, "16", &b, None, &left).unwrap();
+            assert_eq!(reports[0]["on_trial"], true, "{personality}");
+            let refusal = try_update(&world, "16", &a, None, &left).unwrap_err();
+            assert!(refusal.contains("its program is on trial"), "{personality}: {refusal}");
+            let report = nodectl(&world, 16, command).unwrap();
+            assert_eq!(report["result"], result, "{personality}");
+            assert_eq!(report["identification"], runs.header.code_crc(), "{personality}");
+        }
+    }
+}
+
+/// `nodectl` refuses the image before the node is touched, with `--force` too. Without the check of `nodectl` the
+/// bootloader refuses it.
+#[test]
+fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
+    let _expected = expects([Rule::SdoProtocol]);
+    const BOARD: u8 = 64;
+    for (personality, kbit) in PERSONALITIES.into_iter().zip([125, 250, 500, 1000]) {
+        let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
+        let other = signed(version_b(0).code, |about| about.board += 1);
+        let refusal = try_update(&world, "16", &other, None, &[]).unwrap_err();
+        let told = format!(
+            "node 16: the image is for board {:08X}h, the node has board {:08X}h",
+            product::BOARD + 1,
+            product::BOARD
+        );
+        assert!(refusal.contains(&told), "{personality}: {refusal}");
+        let refusal = try_update(&world, "16", &other, None, &["--raw"]).unwrap_err();
+        assert!(refusal.contains("the image is for another board"), "{personality}: {refusal}");
+        let mut bench = Bench::with(unshare(world), kbit * 1000, 16);
+        assert_eq!(bench.settled().code, BOARD, "{personality}");
+        assert_eq!(bench.start(), version_a().header.code_crc(), "{personality}");
+    }
 }
 
 /// The failed node is updated after the others, and its download is continued. Four nodes in a thorough run, otherwise

@@ -155,6 +155,27 @@ fn a_damaged_board_does_not_disturb_its_neighbour_and_an_update_brings_it_back()
     }
 }
 
+/// The bootloader goes on the bus, refuses the image that waits to be copied, and resets: its boot-up message is complete.
+#[test]
+fn a_staged_image_that_is_refused_costs_no_frame() {
+    for kbit in [10, 20, 50, 125, 250, 500, 1000] {
+        let mut bench = damaged(kbit, Damage::Pending);
+        let (errors_before, boot_ups_before) = (errors(&bench), boot_ups(&bench));
+        bench.run(SECOND * 3);
+        assert_eq!(errors(&bench) - errors_before, 0, "{kbit} kbit/s");
+        assert_eq!(
+            boot_ups(&bench) - boot_ups_before,
+            2,
+            "{kbit} kbit/s: of the bootloader and of the application"
+        );
+        assert_eq!(bench.identification_of_running(), version_a().header.code_crc(), "{kbit} kbit/s");
+    }
+}
+
+fn boot_ups(bench: &Bench) -> u64 {
+    bench.world.traffic().node(DAMAGED).boot_ups
+}
+
 /// A record with 250 kbit/s on a bus at 1 Mbit/s: one or two frames are destroyed, and the node then joins the bus at
 /// its bit rate.
 #[test]

@@ -1,6 +1,8 @@
 //! The bootloader as built by its owner: two keys of the owner, without the feature `development`.
 
 use ed25519_dalek::SigningKey;
+use host_tests::watch::expects;
+use monitor::Rule;
 use sign::image::Image;
 use sign::key;
 use update::Description;
@@ -54,6 +56,7 @@ fn it_takes_what_its_owner_has_signed_and_nothing_else() {
 /// The second key revokes the first one: from the first start after the confirmation of the revoking image on.
 #[test]
 fn one_of_its_keys_revokes_the_other_one() {
+    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = bench();
     let take = |bench: &mut Bench, image: &Image| {
         bench.clear();
@@ -62,6 +65,7 @@ fn one_of_its_keys_revokes_the_other_one() {
     let first = signed_by_owner(&version_a(), 0, 0);
     assert!(take(&mut bench, &first));
     assert_eq!(bench.start(), first.header.code_crc());
+    bench.confirm();
     bench.stop();
     let second = signed_by_owner(&version_b(0), 1, 1);
     assert!(take(&mut bench, &second));

@@ -4,10 +4,13 @@ use canbus::Time;
 use canopen::sdo::Multiplexer;
 use host_tests::sdo::{Client, Failure};
 use host_tests::thorough::either;
+use host_tests::watch::expects;
+use monitor::Rule;
 use sign::image::Image;
 use update::Status;
 
-use super::bench::{Bench, START, signed, version_a, version_b};
+use super::bench::{Bench, CLEAR, START, signed, version_a, version_b};
+use super::fleet::PERSONALITIES;
 use crate::support::SECOND;
 
 const fn trial(sub: u8) -> Multiplexer {
@@ -88,6 +91,7 @@ fn a_program_that_a_master_speaks_to_is_confirmed_after_ten_seconds_and_stays() 
 /// The program hangs until the watchdog resets the chip, or it faults at once.
 #[test]
 fn a_program_that_does_not_start_is_replaced_by_the_one_before_with_its_settings() {
+    let _expected = expects([Rule::UnexpectedReset]);
     for instruction in [[0xFE, 0xE7], [0x00, 0xDE]] {
         let mut bench = Bench::new("--bitrate 500", 500_000, 1);
         bench.run(SECOND);
@@ -157,6 +161,31 @@ fn a_master_confirms_a_program_or_takes_it_back_and_nothing_is_stored_before() {
     assert_eq!(write(&mut bench, COMMAND, b"back"), Err(Failure::Refused(0x0800_0022)), "there is no trial");
 }
 
+/// The bootloader refuses the next update until the trial is decided, and the trial is as before.
+#[test]
+fn a_second_update_during_a_trial_is_refused_and_ends_nothing() {
+    const ON_TRIAL: u8 = 73;
+    for (personality, node) in PERSONALITIES.into_iter().zip([1, 16, 127, 1]) {
+        let mut bench = Bench::new(&format!("--bitrate 500 --node {node}:{personality}"), 500_000, node);
+        bench.run(SECOND);
+        bench.update(&version_b(0));
+        bench.stop();
+        assert_eq!(bench.command(CLEAR), Err(Failure::Refused(0x0800_0022)), "{personality}");
+        assert_eq!(bench.status().code, ON_TRIAL);
+        assert!(bench.download(&version_a().to_bytes()).is_err(), "{personality}");
+        assert_eq!(bench.start(), version_b(0).header.code_crc());
+        assert_eq!(state(&mut bench), OPEN, "{personality}");
+        write(&mut bench, COMMAND, b"back").unwrap();
+        bench.run(SECOND * 3);
+        assert_a_is_back(&mut bench, BACK, 2);
+        // The kept image of the next trial is the program that ran before it.
+        bench.update(&version_b(0));
+        write(&mut bench, COMMAND, b"back").unwrap();
+        bench.run(SECOND * 3);
+        assert_a_is_back(&mut bench, BACK, 2);
+    }
+}
+
 /// One program is confirmed, the other one is withdrawn, independently. The two nodes have different personalities.
 #[test]
 fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
@@ -190,6 +219,7 @@ fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
 /// Power cuts at some operations of the return: A runs after each of them.
 #[test]
 fn the_power_goes_on_the_way_back() {
+    let _expected = expects([Rule::HeartbeatLate]);
     let mut bench = Bench::running();
     bench.update(&version_b(0));
     let flash = bench.machine().flash();

@@ -14,6 +14,10 @@ use super::{Bus, BusError, Received, clock};
 
 /// How long to wait for the greeting of a peer that is no adapter.
 const GREETING: Duration = Duration::from_millis(200);
+/// The bits of the longest frame with an 11-bit identifier, with all possible stuff bits and the interframe space.
+const FRAME_BITS: u64 = 135;
+/// How long other participants of the bus may hold up the last frames.
+const MARGIN: Duration = Duration::from_millis(50);
 /// The longest line of an adapter is an extended frame with a time stamp: 30 characters.
 const LONGEST: usize = 64;
 
@@ -62,6 +66,10 @@ pub(super) struct Slcan {
     stream: Stream,
     splitter: Splitter,
     frames: VecDeque<Frame>,
+    /// The time of one frame on the bus.
+    frame_time: Duration,
+    /// When the bus has carried all frames at the latest, if nobody else sends.
+    sent_at: Instant,
 }
 
 impl Slcan {
@@ -82,13 +90,20 @@ impl Slcan {
 
     fn open(mut stream: Stream, bit_rate: u16) -> io::Result<Slcan> {
         stream.write(&opening(bit_rate)?).map_err(io::Error::other)?;
-        Ok(Slcan { stream, splitter: Splitter::default(), frames: VecDeque::new() })
+        let frame_time = Duration(FRAME_BITS * 1000 / u64::from(bit_rate));
+        let (splitter, frames) = (Splitter::default(), VecDeque::new());
+        Ok(Slcan { stream, splitter, frames, frame_time, sent_at: Instant(0) })
     }
 }
 
 impl Drop for Slcan {
-    /// Closes the adapter. An open adapter would fill its buffer for the next user.
+    /// Closes the adapter. An open adapter would fill its buffer for the next user. An adapter drops the frames that it
+    /// has not sent when it is closed, and does not tell when it has sent them. So the frames get the time that they
+    /// take on the bus.
     fn drop(&mut self) {
+        if self.sent_at > Instant(0) {
+            std::thread::sleep(clock::left(self.sent_at + MARGIN));
+        }
         let _ = self.stream.write("C\r");
     }
 }
@@ -99,6 +114,7 @@ impl Bus for Slcan {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.sent_at = self.sent_at.max(self.now()) + self.frame_time;
         self.stream.write(&format(frame))
     }
 

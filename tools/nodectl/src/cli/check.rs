@@ -110,10 +110,11 @@ impl Check {
         }
         let count = |effect| checks.iter().filter(|check| check.effect == effect).count();
         let (resets, stores) = (count(Effect::Resets), count(Effect::Stores));
-        eprint!(
+        write!(
+            io::stderr(),
             "{resets} checks restart the device; {stores} also save its parameters or bring its defaults back, and save again what it had. \
              Do them? [y/N] "
-        );
+        )?;
         io::stderr().flush()?;
         let mut answer = String::new();
         io::stdin().lock().read_line(&mut answer)?;
@@ -124,6 +125,8 @@ impl Check {
     fn try_all(session: &mut Session, options: check::Options) -> Result<check::Run, Failure> {
         let node = session.options.node.one()?;
         let sheet = Check::sheet(session, node)?;
+        // The default SDO server is judged, not the one that other commands prefer.
+        session.network.set_channel(node, None);
         let setup = Setup { node, sheet, timeout: session.options.timeout(), boot: BOOT };
         let bar = bar(options.checks.len());
         let mut subject = Subject::new(&mut session.network, setup);

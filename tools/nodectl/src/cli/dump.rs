@@ -1,21 +1,23 @@
 //! `nodectl dump`, `nodectl diff` and `nodectl apply`: the configuration of a node as a file (CiA 306).
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use clap::Args;
-use eds::{Commissioning, Eds};
+use eds::{Commissioning, Eds, Reals};
 use serde::{Serialize, Serializer};
 
 use super::read::place;
 use super::replacement::Replacement;
 use super::store::{Group, Order, sign};
 use super::{Failure, Session};
-use crate::configuration::{Configuration, Difference, Write, plan};
+use crate::configuration::{Configuration, Difference, Write, is_unclear, node_of, plan};
 use crate::object::{Place, at};
-use crate::text::visible;
+use crate::sdo::AbortCode;
+use crate::text::{note, visible};
 use crate::value::Value;
 
 /// Writes the configuration of a node to a file: a DCF with the values that differ from the defaults.
@@ -28,6 +30,10 @@ pub(super) struct Dump {
     /// All parameters, also those with default values.
     #[arg(long)]
     all: bool,
+
+    /// Write real numbers as their bits, for Lely's tools; python-canopen does not read these.
+    #[arg(long)]
+    bits: bool,
 }
 
 /// Compares two configurations: files (DCF or EDS), or the node itself.
@@ -97,13 +103,15 @@ impl Dump {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let node = session.options.node.one()?;
         let sheet = session.sheet_of(node)?;
+        note_unclear(&sheet);
         let values = session.configuration(node, &sheet)?;
         let mut file = values.to_sheet(&sheet, node, self.all);
         let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
         file.commissioning =
             Some(Commissioning { node_id: node.get(), bit_rate: session.options.bit_rate, serial });
         let name = self.file.file_name().and_then(|name| name.to_str()).unwrap_or("-");
-        let text = file.to_dcf(name);
+        let reals = if self.bits { Reals::Bits } else { Reals::Decimal };
+        let text = file.to_dcf(name, reals);
         if self.file.as_os_str() == "-" {
             return Ok(session.output.write(text.as_bytes())?);
         }
@@ -120,14 +128,19 @@ impl Diff {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let node = session.options.node.one()?;
         let sheet = super::session::sheet(&self.first)?;
-        let first = Configuration::of_sheet(&sheet, node_of(&sheet, node));
-        let second = match &self.second {
+        // COB-IDs that follow the node-ID are compared as if both configurations were of one node.
+        let (node, second) = match &self.second {
             Some(path) => {
-                let other = super::session::sheet(path)?;
-                Configuration::of_sheet(&other, node_of(&other, node))
+                let (other, node) = (super::session::sheet(path)?, node_of(&sheet).unwrap_or(node));
+                (node, Configuration::of_sheet(&other, node))
             }
-            None => session.configuration(node, &sheet)?,
+            None => {
+                note_node_id(&sheet, node, "compared");
+                note_unclear(&sheet);
+                (node, session.configuration(node, &sheet)?)
+            }
         };
+        let first = Configuration::of_sheet(&sheet, node);
         let differences = first.differences(&second);
         for Difference { at, first, second } in &differences {
             let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry));
@@ -145,6 +158,8 @@ impl Apply {
         let node = session.options.node.one()?;
         let sheet = super::session::sheet(&self.file)?;
         self.check(session, node, &sheet)?;
+        note_node_id(&sheet, node, "written");
+        note_unclear(&sheet);
         if self.dry_run {
             let now = session.configuration(node, &sheet)?;
             let steps = plan(&sheet, &now, &Configuration::of_sheet(&sheet, node));
@@ -170,6 +185,27 @@ impl Apply {
     }
 }
 
+/// Tells the user that a file is of another node-ID.
+fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
+    if let Some(of_file) = node_of(sheet).filter(|of_file| *of_file != node) {
+        let (of_file, node) = (of_file.get(), node.get());
+        note(format_args!(
+            "the file is of node {of_file}; COB-IDs that follow the node-ID are {done} for node {node}"
+        ));
+    }
+}
+
+/// Tells the user that a data sheet does not say which entries are parameters.
+fn note_unclear(sheet: &Eds) {
+    let count = sheet.entries().filter(|entry| is_unclear(entry)).count();
+    if count > 0 {
+        note(format_args!(
+            "{count} objects that an RPDO can write are left out: the data sheet does not say (ObjFlags) whether they \
+             are parameters or process values"
+        ));
+    }
+}
+
 /// Why a file does not fit a node. A node would refuse the file of another product object by object, so nothing is
 /// written then.
 pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Result<Option<String>, Failure> {
@@ -189,36 +225,51 @@ pub(super) fn bring(
 ) -> Result<Vec<Write>, Failure> {
     let wanted = Configuration::of_sheet(sheet, node);
     let mut written = Vec::new();
-    let mut steps = plan(sheet, &read(session)?, &wanted);
+    let mut refusals = BTreeMap::new();
+    let mut now = read(session)?;
     for _ in 0..PASSES {
+        let mut steps = plan(sheet, &now, &wanted);
         if steps.is_empty() {
-            break;
+            return Ok(written);
         }
-        write_all(session, node, sheet, &steps)?;
+        refusals = write_all(session, node, sheet, &steps)?;
         written.append(&mut steps);
-        steps = plan(sheet, &read(session)?, &wanted);
+        now = read(session)?;
     }
-    if steps.is_empty() {
-        return Ok(written);
-    }
-    let left: Vec<String> = steps.iter().map(|step| Place(step.at).to_string()).collect();
-    Err(Failure::NotApplied(left.join(", ")))
+    let left: Vec<String> = plan(sheet, &now, &wanted)
+        .iter()
+        .filter(|step| now.values.get(&key(step.at)) != Some(&step.value))
+        .map(|step| left(step, &now, &refusals))
+        .collect();
+    if left.is_empty() { Ok(written) } else { Err(Failure::NotApplied(left.join(", "))) }
 }
 
-/// Writes parameters in their order.
-fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) -> Result<(), Failure> {
+/// The refusals of a node, by index and sub-index.
+type Refusals = BTreeMap<(u16, u8), AbortCode>;
+
+fn key(Multiplexer { index, sub }: Multiplexer) -> (u16, u8) {
+    (index, sub)
+}
+
+/// A parameter that has another value than wanted, with the reason where the node has told one.
+fn left(step: &Write, now: &Configuration, refusals: &Refusals) -> String {
+    let is = now.values.get(&key(step.at)).map_or("not there".to_owned(), Value::to_string);
+    let why = refusals.get(&key(step.at)).map(|code| format!(" ({code})")).unwrap_or_default();
+    visible(&format!("{} is {is} instead of {}{why}", Place(step.at), step.value))
+}
+
+/// Writes parameters in their order. A refused one does not stop the others: it may be taken in the next pass.
+fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) -> Result<Refusals, Failure> {
+    let mut refusals = Refusals::new();
     for step in steps {
         let Some(entry) = sheet.get(step.at.index, step.at.sub) else { continue };
         let bytes = step.value.encode(entry.data_type);
-        let written = session.client(node).download(step.at, &bytes, |_| ());
-        written.map_err(|error| session.named(error))?;
+        if let Err(error) = session.client(node).download(step.at, &bytes, |_| ()) {
+            let code = error.abort().ok_or_else(|| session.named(error))?;
+            refusals.insert(key(step.at), code);
+        }
     }
-    Ok(())
-}
-
-/// The node-ID that a file names, else the other one.
-fn node_of(sheet: &Eds, otherwise: NodeId) -> NodeId {
-    sheet.commissioning.as_ref().and_then(|to| NodeId::new(to.node_id)).unwrap_or(otherwise)
+    Ok(refusals)
 }
 
 /// `1017h:0 Producer heartbeat time: 1000 -> 500`

@@ -25,7 +25,8 @@ Exit codes:
   6  the program is not for this node; nothing was changed
   7  a file cannot be read or written
   8  two configurations differ (diff)
-  9  the device does not conform (check)";
+  9  the device does not conform (check)
+ 10  a rule of the bus is broken (rules)";
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -76,6 +77,9 @@ pub enum Failure {
         /// The values that the device has not taken back.
         left_behind: Vec<String>,
     },
+    /// Rules of the bus are broken; each breach has been printed already.
+    #[error("{0} breaches of the rules of the bus")]
+    RulesBroken(usize),
     /// A node has other values than the values that were written.
     #[error("still different after it was written: {0}")]
     NotApplied(String),
@@ -106,6 +110,12 @@ impl Failure {
         matches!(self, Failure::Sdo(error) if error.is_silence())
     }
 
+    /// Whether the reader of the results has closed its end.
+    #[must_use]
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Failure::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+
     /// The failure as JSON: one schema for all commands.
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
@@ -126,6 +136,7 @@ impl Failure {
             Failure::Usage(_) => 2,
             Failure::Different(_) => 8,
             Failure::NotConforming { .. } => 9,
+            Failure::RulesBroken(_) => 10,
             Failure::NotApplied(_) => 1,
             Failure::Sdo(error) => sdo_code(error),
             Failure::Lss(lss::Error::Service(Service::Refused(..))) => 1,
@@ -145,7 +156,7 @@ fn left_words(left_behind: &[String]) -> String {
 fn sdo_code(error: &sdo::Error) -> u8 {
     match error.cause {
         Cause::Transfer(transfer::Error::Abort(_)) => 1,
-        Cause::Transfer(_) => 3,
+        Cause::Transfer(_) | Cause::Busy => 3,
         Cause::Bus(_) => 4,
     }
 }
@@ -158,7 +169,10 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
         update::Error::Flash { .. } | update::Error::Identification { .. } => 5,
-        update::Error::Product { .. } | update::Error::Older { .. } => 6,
+        update::Error::Board { .. }
+        | update::Error::Older { .. }
+        | update::Error::OnTrial { .. }
+        | update::Error::NoTrial { .. } => 6,
     }
 }
 

@@ -17,11 +17,14 @@ mod paper;
 mod read;
 mod record;
 mod replacement;
+mod rules;
 mod scan;
 mod serve;
 mod session;
+mod sheets;
 mod store;
 mod trace;
+mod trial;
 mod update;
 mod write;
 
@@ -62,11 +65,14 @@ enum Command {
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),
+    Rules(rules::Rules),
     Save(store::Save),
     Restore(store::Restore),
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Confirm(trial::Confirm),
+    Rollback(trial::Rollback),
     Serve(serve::Serve),
     Check(check::Check),
     Completions(manual::Completions),
@@ -96,6 +102,7 @@ impl Cli {
         match &self.command {
             Command::Diff(diff) => diff.needs_a_bus(),
             Command::Trace(trace) => trace.needs_a_bus(),
+            Command::Rules(rules) => rules.needs_a_bus(),
             Command::Check(check) => check.needs_a_bus(),
             Command::Completions(_) | Command::Man(_) => false,
             _ => true,
@@ -121,11 +128,14 @@ impl Cli {
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
             Command::Trace(trace) => trace.run(session),
+            Command::Rules(rules) => rules.run(session),
             Command::Save(save) => save.run(session),
             Command::Restore(restore) => restore.run(session),
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Confirm(confirm) => confirm.run(session),
+            Command::Rollback(rollback) => rollback.run(session),
             Command::Serve(_) => Err(Failure::Usage("it has sessions of its own".to_owned())),
             Command::Check(check) => check.run(session),
             Command::Completions(completions) => completions.run(session),

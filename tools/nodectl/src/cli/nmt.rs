@@ -75,8 +75,9 @@ fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result
 }
 
 /// Changes the state. A node without a heartbeat cannot tell its state; then an SDO answer shows that the node exists.
+/// A stopped node has no SDO, so a node that is to stop is asked before.
 fn change(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
-    let answers = is_there(session, node)?;
+    let answers = matches!(command, nmt::Command::Stop) && is_there(session, node)?;
     let time = session.options.timeout().max(Duration::from_millis(1500));
     let state = master::change(&mut session.network, command, node, time)?;
     if state.is_none() && !answers && !is_there(session, node)? {

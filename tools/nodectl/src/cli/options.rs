@@ -23,11 +23,12 @@ pub struct Options {
     #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S", default_value_t = 250)]
     pub bit_rate: u16,
 
-    /// Node-ID, for update and info several (1,2,5-8), for nmt also "all".
+    /// Node-ID, for read, update and info several (1,2,5-8), for nmt also "all".
     #[arg(long, short, global = true, env = "NODECTL_NODE", default_value = "1")]
     pub node: NodeSet,
 
-    /// Data sheet of the node; else the one of this project with its vendor-ID and product code.
+    /// Data sheet of the node, or a folder of data sheets from which each node gets the one with its vendor-ID and product
+    /// code; else the one of this project.
     #[arg(long, global = true, value_name = "FILE")]
     pub eds: Option<PathBuf>,
 

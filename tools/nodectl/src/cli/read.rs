@@ -13,9 +13,13 @@ use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::object::Place;
 use crate::quantity::Quantity;
+use crate::sdo::AbortCode;
 use crate::text::visible;
 use crate::value::{Value, data_type, guess};
 use crate::{Catalogue, meaning};
+
+/// "No data available" (CiA 301, table 22).
+const NO_DATA: AbortCode = AbortCode(0x0800_0024);
 
 /// Reads objects.
 #[derive(Debug, Args)]
@@ -62,18 +66,57 @@ pub(super) struct Reading {
     meaning: Option<String>,
     #[serde(skip)]
     class: Class,
+    /// Whether the text has the number of the node.
+    #[serde(skip)]
+    is_named: bool,
 }
 
 impl Read {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        let node = session.options.node.one()?;
-        let mut objects = Vec::new();
-        for query in &self.objects {
-            objects.extend(self.meant(session, node, query)?);
+        let nodes = session.options.node.list()?;
+        if nodes.len() > 1 && self.out.is_some() {
+            return Err(Failure::Usage("--out is for one node".to_owned()));
         }
         let mut failures = Vec::new();
-        for at in objects.iter().copied() {
-            match self.read(session, node, at) {
+        let mut all = 0;
+        for node in &nodes {
+            match self.read_node(session, *node, nodes.len() > 1, &mut failures) {
+                Ok(count) => all += count,
+                // A node that does not answer does not stop the reading of the others.
+                Err(failure @ Failure::Sdo(_)) if nodes.len() > 1 => {
+                    all += 1;
+                    session.tell(&failure)?;
+                    failures.push(failure);
+                }
+                Err(failure) => return Err(failure),
+            }
+        }
+        match failures.first() {
+            None => Ok(()),
+            Some(first) => {
+                Err(Failure::Objects { failed: failures.len(), all, exit_code: first.exit_code() })
+            }
+        }
+    }
+
+    /// Reads the objects of a node. Returns their number. With `is_named`, each line has the number of the node.
+    fn read_node(
+        &self,
+        session: &mut Session,
+        node: NodeId,
+        is_named: bool,
+        failures: &mut Vec<Failure>,
+    ) -> Result<usize, Failure> {
+        let mut objects = Vec::new();
+        for query in &self.objects {
+            let meant = self.meant(session, node, query)?;
+            let is_whole = meant.len() > 1;
+            objects.extend(meant.into_iter().map(|at| (at, is_whole)));
+        }
+        for (at, is_whole) in objects.iter().copied() {
+            match self.read(session, node, at, is_named) {
+                // An empty entry of a list, such as an error that has not occurred (1003h).
+                Err(Failure::Sdo(error)) if is_whole && error.abort() == Some(NO_DATA) => (),
                 // An object that cannot be read does not stop the reading of the others.
                 Err(failure @ Failure::Sdo(_)) if objects.len() > 1 && !failure.is_silence() => {
                     session.tell(&failure)?;
@@ -82,14 +125,7 @@ impl Read {
                 result => result?,
             }
         }
-        match failures.first() {
-            None => Ok(()),
-            Some(first) => Err(Failure::Objects {
-                failed: failures.len(),
-                all: objects.len(),
-                exit_code: first.exit_code(),
-            }),
-        }
+        Ok(objects.len())
     }
 
     /// The object that a person means. For a record or an array without a sub-index, all its sub-indices.
@@ -101,14 +137,21 @@ impl Read {
         Ok(if is_whole && subs.len() > 1 { subs } else { vec![at] })
     }
 
-    fn read(&self, session: &mut Session, node: NodeId, at: Multiplexer) -> Result<(), Failure> {
+    fn read(
+        &self,
+        session: &mut Session,
+        node: NodeId,
+        at: Multiplexer,
+        is_named: bool,
+    ) -> Result<(), Failure> {
         let mut client = session.client(node);
         let bytes = if self.block { client.block_upload(at) } else { client.upload(at) };
         let bytes = bytes.map_err(|error| session.named(error))?;
         match &self.out {
             Some(path) => write_out(session, path, &bytes),
             None => {
-                let reading = self.reading(session, node, at, &bytes)?;
+                let mut reading = self.reading(session, node, at, &bytes)?;
+                reading.is_named = is_named;
                 session.print(&reading)
             }
         }
@@ -191,6 +234,7 @@ impl Reading {
             unit: quantity.unit.clone(),
             meaning,
             class: data_type.class(),
+            is_named: false,
         }
     }
 }
@@ -210,6 +254,9 @@ pub(super) fn place<S: Serializer>(at: &Multiplexer, serializer: S) -> Result<S:
 /// `1017h:0 Producer heartbeat time = 1000 ms`
 impl fmt::Display for Reading {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.is_named {
+            write!(f, "node {}: ", self.node)?;
+        }
         write!(f, "{} ", Place(self.at))?;
         if let Some(name) = &self.name {
             write!(f, "{name} ")?;

@@ -7,10 +7,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::output::hex;
+use super::session::silence;
 use super::{Failure, Session};
 use crate::object::at;
 use crate::scan::{Presence, scan};
-use crate::text::visible;
+use crate::text::{note, visible};
 use crate::{heartbeat, value};
 
 /// The hint when no node answers.
@@ -50,7 +51,13 @@ impl Scan {
             nodes.push(row(session, node, presence)?);
         }
         let is_empty = nodes.is_empty();
+        let answering: Vec<u8> =
+            nodes.iter().filter(|row| row.device_type.is_some()).map(|row| row.node).collect();
         session.print(&Found { nodes })?;
+        for (node, heard) in session.network.all_heard().filter(|(node, _)| !answering.contains(&node.get()))
+        {
+            note(format_args!("node {}: {}", node.get(), silence(node, Some(heard))));
+        }
         if is_empty {
             return Err(Failure::Silence(NOBODY.to_owned()));
         }

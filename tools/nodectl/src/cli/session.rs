@@ -13,17 +13,22 @@ use eds::Eds;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
+use super::sheets::{Device, Sheets, misfit};
 use super::{Failure, Options, Output};
 use crate::bus::NoBus;
 use crate::configuration::Configuration;
+use crate::network::Heard;
 use crate::object::at;
-use crate::sdo::{self, Client};
-use crate::text::visible_lines;
+use crate::sdo::{self, Channel, Client};
+use crate::text::{note, visible_lines};
 use crate::value;
-use crate::{Catalogue, Network};
+use crate::{Catalogue, Network, heartbeat};
 
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
+
+/// How long to listen before the first request. The frames of a running transfer come more often.
+const LISTEN: Duration = Duration::from_millis(50);
 
 /// A factor on the time limit for reading a whole dictionary. A slow bus needs 20 s for 400 objects; this limit is
 /// three times as long.
@@ -34,8 +39,11 @@ pub struct Session {
     pub(super) network: Network,
     pub(super) options: Options,
     pub(super) output: Output,
-    /// The data sheet of the options, once it has been read.
-    sheet: Option<Eds>,
+    /// The data sheets of the options, once they have been read.
+    sheets: Option<Sheets>,
+    /// Whether a data sheet is used only for a node whose identity it has: there are many nodes, of which the user has
+    /// named none.
+    pub(super) has_many_nodes: bool,
     catalogues: BTreeMap<NodeId, Arc<Catalogue>>,
     /// The deadline of all transfers that belong together.
     deadline: Instant,
@@ -48,10 +56,12 @@ impl Session {
     /// The bus cannot be opened.
     pub fn open(options: &Options, output: Output) -> Result<Session, Failure> {
         // Read the data sheet first, so that a wrong one is reported before the bus is opened.
-        let sheet = options.eds.as_deref().map(sheet).transpose()?;
+        let sheets = Some(Sheets::read(options.eds.as_deref())?);
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
-        let network = Network::open(move || address.open(bit_rate))?;
-        Ok(Session { sheet, ..Session::with(network, options, output) })
+        let mut network = Network::open(move || address.open(bit_rate))?;
+        // Another client's transfer may run already.
+        network.pause(LISTEN)?;
+        Ok(Session { sheets, ..Session::with(network, options, output) })
     }
 
     /// A session without a bus, for a command that works on files.
@@ -59,9 +69,9 @@ impl Session {
     /// # Errors
     /// The data sheet of the options cannot be used.
     pub fn without_a_bus(options: &Options, output: Output) -> Result<Session, Failure> {
-        let sheet = options.eds.as_deref().map(sheet).transpose()?;
+        let sheets = Some(Sheets::read(options.eds.as_deref())?);
         let network = Network::open(|| Ok(Box::new(NoBus)))?;
-        Ok(Session { sheet, ..Session::with(network, options, output) })
+        Ok(Session { sheets, ..Session::with(network, options, output) })
     }
 
     /// A session on an open bus.
@@ -71,7 +81,8 @@ impl Session {
             network,
             options: options.clone(),
             output,
-            sheet: None,
+            sheets: None,
+            has_many_nodes: false,
             catalogues: BTreeMap::new(),
             deadline: Instant::NEVER,
         }
@@ -95,19 +106,36 @@ impl Session {
         self.deadline = self.network.now() + limit;
     }
 
+    /// The data sheets of the options.
+    pub(super) fn sheets(&mut self) -> Result<&Sheets, Failure> {
+        if self.sheets.is_none() {
+            self.sheets = Some(Sheets::read(self.options.eds.as_deref())?);
+        }
+        Ok(self.sheets.get_or_insert_default())
+    }
+
     /// The catalogue of a node: the data sheet of the options, else the built-in data sheet for its identity.
     pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Arc<Catalogue>, Failure> {
         if let Some(known) = self.catalogues.get(&node) {
             return Ok(Arc::clone(known));
         }
-        if self.sheet.is_none() {
-            self.sheet = self.options.eds.as_deref().map(sheet).transpose()?;
-        }
-        let catalogue = match self.sheet.clone() {
-            Some(sheet) => Catalogue::new(sheet),
-            None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
-        };
+        let device = self.device(node)?;
+        let catalogue = self.catalogue_of(node, device)?;
+        self.choose_channel(node, &catalogue)?;
         Ok(Arc::clone(self.catalogues.entry(node).or_insert(Arc::new(catalogue))))
+    }
+
+    /// Uses the second SDO server of a node (1201h) where the node has one that is switched on: the first one may have
+    /// another client.
+    fn choose_channel(&mut self, node: NodeId, catalogue: &Catalogue) -> Result<(), Failure> {
+        let [request, response] = [at(0x1201, 1), at(0x1201, 2)];
+        if catalogue.entry(request).is_none() {
+            return Ok(());
+        }
+        let cob_ids = self.word(node, request)?.zip(self.word(node, response)?);
+        let channel = cob_ids.and_then(|(request, response)| Channel::of_cob_ids(request, response));
+        self.network.set_channel(node, channel);
+        Ok(())
     }
 
     /// Whether the catalogue of a node is known already.
@@ -122,14 +150,14 @@ impl Session {
 
     /// The data sheet of a node; an error where none is known.
     pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
-        let sheet = self.catalogue(node)?.sheet().clone();
-        if sheet.device.product_name.is_empty() {
+        let catalogue = self.catalogue(node)?;
+        if !catalogue.is_of_a_device() {
             let node = node.get();
             return Err(Failure::Usage(format!(
                 "no data sheet is known for node {node}: give it with --eds"
             )));
         }
-        Ok(sheet)
+        Ok(catalogue.sheet().clone())
     }
 
     /// The values of all parameters of a node.
@@ -156,9 +184,26 @@ impl Session {
         values.map_err(|error| self.named(error))
     }
 
-    fn identify(&mut self, node: NodeId) -> Result<Option<Catalogue>, Failure> {
-        let (vendor, product) = (self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?);
-        Ok(vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)))
+    /// Vendor-ID and product code of a node.
+    fn device(&mut self, node: NodeId) -> Result<Device, Failure> {
+        Ok((self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?))
+    }
+
+    /// The catalogue of a node with this identity. A file that the user has named for one node is used for it, and the
+    /// user is told when it is for another device.
+    pub(super) fn catalogue_of(&mut self, node: NodeId, device: Device) -> Result<Catalogue, Failure> {
+        let is_for_all = !self.has_many_nodes;
+        let sheets = self.sheets()?;
+        if let Some(sheet) = sheets.of(device) {
+            return Ok(Catalogue::new(sheet.clone()));
+        }
+        if let Some(sheet) = sheets.file().filter(|_| is_for_all) {
+            note(format_args!("node {}: {}", node.get(), misfit(sheet, device)));
+            return Ok(Catalogue::new(sheet.clone()));
+        }
+        let built_in =
+            device.0.zip(device.1).and_then(|(vendor, product)| Catalogue::built_in(vendor, product));
+        Ok(built_in.unwrap_or_else(Catalogue::unknown))
     }
 
     /// The value of an UNSIGNED32 object; `None` where the node has no such object.
@@ -195,8 +240,8 @@ impl Session {
 
     /// A hint for the user on an error.
     fn hint(&self, error: &sdo::Error) -> Option<String> {
-        if error.is_silence() && self.network.last_state(error.node) == Some(State::Stopped) {
-            return Some("the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned());
+        if error.is_silence() {
+            return Some(silence(error.node, self.network.heard(error.node)));
         }
         let code = error.abort()?.0;
         let catalogue = self.catalogues.get(&error.node);
@@ -211,6 +256,21 @@ impl Session {
                      empty (sub-index 0 is 0)"
                 ))
             }
+            (0x0800_0022, 0x6125 | 0x6925) => {
+                let status = 0x6150 + (error.at.index - 0x6125);
+                Some(format!(
+                    "the process value is not valid: see the status, {status:04X}h:{}",
+                    error.at.sub
+                ))
+            }
+            (0x0800_0022, 0x2200..=0x2202) if catalogue?.is_of_this_project() => Some(
+                "the calibration is locked; `nodectl write 2203 cali` opens it until the next reset"
+                    .to_owned(),
+            ),
+            (0x0601_0000, 0x2107) if catalogue?.is_of_this_project() => Some(
+                "the factory data are locked; `nodectl write 2108 fact` opens them until the next reset"
+                    .to_owned(),
+            ),
             (0x0609_0011, 0x1010 | 0x1011) => Some("the node has no such group of parameters".to_owned()),
             _ => None,
         }
@@ -221,13 +281,35 @@ impl Session {
         if self.options.json {
             return Ok(self.output.json(&failure.to_json())?);
         }
-        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
+        note(format_args!("nodectl: {}", visible_lines(&failure.to_string())));
         Ok(())
     }
 
     /// Prints a result.
     pub(super) fn print(&mut self, result: &(impl Serialize + Display)) -> Result<(), Failure> {
         Ok(self.output.print(result)?)
+    }
+}
+
+/// Why a node may not answer, and what the user can do.
+pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
+    let node = node.get();
+    match heard {
+        Some(Heard { state: Some(State::Stopped), .. }) => {
+            "the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned()
+        }
+        Some(Heard { state, .. }) => {
+            let state =
+                state.map(|state| format!(" (it is {})", heartbeat::words(state))).unwrap_or_default();
+            format!(
+                "the node sends{state} and does not answer: its PDOs may leave no room on the bus; \
+                 `nodectl nmt preop -n {node}` ends them, then longer event timers and inhibit times help (1800h:5, 1800h:3)"
+            )
+        }
+        None => format!(
+            "nothing is heard of node {node}: is it on, with this node-ID and the bit rate of the bus? `nodectl scan` \
+             lists the nodes, `nodectl lss scan` those without a node-ID"
+        ),
     }
 }
 

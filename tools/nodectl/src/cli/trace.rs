@@ -5,6 +5,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, Instant, NodeId};
@@ -15,6 +16,7 @@ use super::node_set::NodeSet;
 use super::read::place;
 use super::record::seconds_between;
 use super::{Failure, Session};
+use crate::Catalogue;
 use crate::scan::scan;
 use crate::text::{hex_digits, visible};
 use crate::trace::{Decoder, Kind, Knowledge, Line, Shown, parse_candump};
@@ -114,11 +116,11 @@ impl Trace {
     /// A decoder with the knowledge about the nodes.
     fn decoder(&self, session: &mut Session) -> Result<Decoder, Failure> {
         let mut decoder = Decoder::default();
-        if session.options.eds.is_some() {
-            for node in self.named() {
-                let catalogue = session.catalogue(node)?;
-                decoder.know(node, Knowledge::new(catalogue));
-            }
+        if let Some(sheet) = session.sheets()?.file().cloned() {
+            let catalogue = Arc::new(Catalogue::new(sheet));
+            self.named()
+                .into_iter()
+                .for_each(|node| decoder.know(node, Knowledge::new(Arc::clone(&catalogue))));
         }
         if self.file.is_none() && !self.silent {
             for node in self.present(session)? {

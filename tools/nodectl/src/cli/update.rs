@@ -12,12 +12,12 @@ use serde::Serialize;
 use super::failure::update_code;
 use super::output::hex;
 use super::{Failure, Session};
-use crate::text::visible;
+use crate::text::{note, visible};
 use crate::update::{Error, Image, Options, Outcome, Step, Watcher, update};
 
 /// Replaces the program of nodes (CiA 302-3), one after the other.
 ///
-/// Product and version are checked before anything is erased. If a node or the bus is lost, the command waits for it
+/// Board and version are checked before anything is erased. If a node or the bus is lost, the command waits for it
 /// and continues the update. Node-IDs by --node: 1,2,5-8.
 #[derive(Debug, Args)]
 pub(super) struct Update {
@@ -28,7 +28,7 @@ pub(super) struct Update {
     #[arg(long)]
     force: bool,
 
-    /// The file is of another format: download it as it is, with no check of product and version.
+    /// The file is of another format: download it as it is, with no check of board and version.
     #[arg(long)]
     raw: bool,
 
@@ -163,7 +163,7 @@ impl Watcher for Bar {
         self.0.reset();
         // Without a terminal the steps are printed as lines.
         if self.0.is_hidden() {
-            eprintln!("node {}: {step}", node.get());
+            note(format_args!("node {}: {step}", node.get()));
         }
     }
 

@@ -9,8 +9,10 @@ use eds::DataType;
 
 use super::read::{Reading, parse_type};
 use super::{Failure, Session};
+use crate::Catalogue;
 use crate::object::Place;
 use crate::quantity::Quantity;
+use crate::value::{Value, ValueError};
 
 /// Writes an object, and prints what was written.
 #[derive(Debug, Args)]
@@ -18,14 +20,18 @@ pub(super) struct Write {
     /// Object by index (1017, 0x1018sub1) or by name ("Producer heartbeat time").
     object: String,
 
-    /// The value: decimal or after 0x hexadecimal; text; bytes as pairs of hexadecimal digits. An integer that stands for a
-    /// value in a unit is taken as that value where it has a point (2.5).
+    /// The value: decimal or after 0x hexadecimal; text; bytes as pairs of hexadecimal digits. A decimal number is the
+    /// value in its unit, as `read` shows it (2.5). Units (mbar, kPa) and signatures (save, load, zero, cali) are words.
     #[arg(required_unless_present = "file", conflicts_with = "file", allow_hyphen_values = true)]
     value: Option<String>,
 
     /// Its data type, where no data sheet tells it: UNSIGNED32 or u32, REAL32 or r32 ...
     #[arg(long = "type", value_name = "TYPE", value_parser = parse_type)]
     data_type: Option<DataType>,
+
+    /// The value is the number on the wire, not the value in its unit.
+    #[arg(long)]
+    raw: bool,
 
     /// Write in blocks.
     #[arg(long)]
@@ -43,7 +49,7 @@ impl Write {
         let catalogue = session.catalogue(node)?;
         let data_type = self.data_type.or_else(|| catalogue.data_type(at));
         let quantity = Quantity::of(&mut session.client(node), &catalogue, at)?;
-        let bytes = self.bytes(at, data_type, &quantity)?;
+        let bytes = self.bytes(at, &catalogue, data_type, &quantity)?;
         let mut client = session.client(node);
         let written = if self.block {
             client.block_download(at, &bytes, |_| ())
@@ -59,6 +65,7 @@ impl Write {
     fn bytes(
         &self,
         at: Multiplexer,
+        catalogue: &Catalogue,
         data_type: Option<DataType>,
         quantity: &Quantity,
     ) -> Result<Vec<u8>, Failure> {
@@ -69,9 +76,14 @@ impl Write {
         let data_type = data_type.ok_or_else(|| {
             Failure::Usage(format!("no data sheet tells the type of {}: give it with --type", Place(at)))
         })?;
-        match quantity.parse(text, data_type) {
+        let word = catalogue.word(at, text);
+        match word.map_or_else(|| self.parse(text, data_type, quantity), Ok) {
             Ok(value) => Ok(value.encode(data_type)),
             Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
         }
+    }
+
+    fn parse(&self, text: &str, data_type: DataType, quantity: &Quantity) -> Result<Value, ValueError> {
+        if self.raw { Value::parse(text, data_type) } else { quantity.parse(text, data_type) }
     }
 }

@@ -1,5 +1,6 @@
 //! The configuration of a device: the values of all parameters, from the device itself or from a file (CiA 306).
 
+mod cob_id;
 mod plan;
 
 use std::collections::BTreeMap;
@@ -32,28 +33,45 @@ pub struct Difference {
     pub second: Option<Value>,
 }
 
-/// Whether an object is a command: a write makes the device act.
+/// Whether an entry is a parameter: readable and writable, no domain, and not excluded by the data sheet (`ObjFlags`).
+/// In a data sheet without these flags, commands of CiA 301 and 302 are no parameters, and neither are entries that an
+/// RPDO can write, unless the file has a value for them: they may be process values, which move a drive.
+#[must_use]
+pub fn is_parameter(entry: &Entry) -> bool {
+    let has_value = !matches!(entry.data_type, eds::DataType::DOMAIN);
+    let is_open = entry.access.is_readable() && entry.access.is_writable();
+    is_open && has_value && !is_excluded(entry)
+}
+
+fn is_excluded(entry: &Entry) -> bool {
+    match entry.flags {
+        Some(flags) => flags.refuse_write(),
+        None => is_command(entry.index) || is_unclear(entry),
+    }
+}
+
+/// Whether a write to an object makes the device act (CiA 301, CiA 302-3).
 fn is_command(index: u16) -> bool {
     matches!(index, 0x1003 | 0x1010 | 0x1011 | 0x1F50..=0x1F5F)
 }
 
-/// Whether an entry is a parameter: readable and writable, and neither a command nor a domain nor a process value of an
-/// RPDO.
+/// Whether an entry may be a parameter or a process value: the data sheet does not say.
 #[must_use]
-pub fn is_parameter(entry: &Entry) -> bool {
-    let is_process_value = entry.mappable && entry.is_rpdo_mappable();
-    let has_value = !matches!(entry.data_type, eds::DataType::DOMAIN);
-    let is_open = entry.access.is_readable() && entry.access.is_writable();
-    is_open && has_value && !is_process_value && !is_command(entry.index)
+pub fn is_unclear(entry: &Entry) -> bool {
+    entry.flags.is_none() && entry.access.is_readable() && entry.is_rpdo_mappable() && entry.value.is_none()
 }
 
 impl Configuration {
-    /// The values of a data sheet or a configuration file. Where there is no value, the default.
+    /// The values of a data sheet or a configuration file, for a node. Where there is no value, the default. COB-IDs that
+    /// follow the node-ID are those of `node`, whatever the node-ID in the file.
     #[must_use]
     pub fn of_sheet(sheet: &Eds, node: NodeId) -> Configuration {
+        let of_file = node_of(sheet).unwrap_or(node);
         let value = |entry: &Entry| {
-            let formula = entry.value.as_ref().or(entry.default.as_ref())?;
-            Some(((entry.index, entry.sub), decode(formula, entry, node)?))
+            let written = entry.value.as_ref().or(entry.default.as_ref())?;
+            let following = cob_id::formula(entry, &decode(written, entry, of_file)?, of_file);
+            let value = decode(following.as_ref().unwrap_or(written), entry, node)?;
+            Some(((entry.index, entry.sub), value))
         };
         Configuration {
             values: sheet.entries().filter(|entry| is_parameter(entry)).filter_map(value).collect(),
@@ -110,10 +128,17 @@ impl Configuration {
             let key = (entry.index, entry.sub);
             let value = self.values.get(&key);
             let is_wanted = all || !same(value, defaults.values.get(&key));
-            entry.value = value.filter(|_| is_wanted).and_then(encode);
+            let formula = |value| cob_id::formula(entry, value, node).or_else(|| encode(value));
+            entry.value = value.filter(|_| is_wanted).and_then(formula);
         }
         file
     }
+}
+
+/// The node-ID that a file is for.
+#[must_use]
+pub fn node_of(sheet: &Eds) -> Option<NodeId> {
+    sheet.commissioning.as_ref().and_then(|to| NodeId::new(to.node_id))
 }
 
 /// Whether two values are equal. NaN is equal to NaN.

@@ -5,6 +5,7 @@ use canopen::client::sdo::{self, BlockDownload, BlockUpload, Download, Upload};
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
 
+use super::channel::Via;
 use super::memory::Memory;
 use super::{Cause, Error, Options};
 use crate::network::Network;
@@ -105,9 +106,28 @@ impl<'n> Client<'n> {
     where
         S: Service<Output = Result<(), sdo::Error>>,
     {
-        let result = self.network.run_with(service, progress);
-        let result = result.map_err(Cause::from).and_then(|result| result.map_err(Cause::from));
+        let result = self.in_turn(service, progress);
         result.map_err(|cause| Error { node: self.node, at, name: None, hint: None, cause })
+    }
+
+    /// Runs a transfer when no transfer of another client runs.
+    fn in_turn<S>(&mut self, service: &mut S, mut progress: impl FnMut(&S)) -> Result<(), Cause>
+    where
+        S: Service<Output = Result<(), sdo::Error>>,
+    {
+        let node = self.node;
+        let deadline = self.network.now() + self.options().limit;
+        if !self.network.wait_for_turn(node, deadline)? {
+            return Err(Cause::Busy);
+        }
+        let channel = self.network.channel(node);
+        let mut via = Via { service, node, channel };
+        let result = self.network.run_with(&mut via, |via| progress(via.service))?;
+        if result == Err(sdo::Error::NoAnswer) {
+            // The additional server may have been switched off; the default one is always there.
+            self.network.set_channel(node, None);
+        }
+        Ok(result?)
     }
 }
 

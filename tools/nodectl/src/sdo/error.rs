@@ -36,6 +36,9 @@ pub enum Cause {
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// Another client used the SDO server of the node all the time.
+    #[error("another client uses the SDO server of the node")]
+    Busy,
 }
 
 impl Error {

@@ -1,10 +1,12 @@
 //! The SDO client of crate `canopen` on an open bus (CiA 301, 7.2.4).
 
+mod channel;
 mod client;
 mod error;
 mod memory;
 
 pub use canopen::client::sdo::{AbortCode, Options};
+pub use channel::Channel;
 pub use client::Client;
 pub use error::{Cause, Error};
 

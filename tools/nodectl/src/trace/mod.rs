@@ -21,7 +21,7 @@ use crate::Catalogue;
 use crate::text::hex_digits;
 use crate::value::Value;
 use pdo::Pdos;
-use sdo::Transfers;
+pub(crate) use sdo::{Transferred, Transfers};
 use services::States;
 
 /// The service that a frame belongs to.

@@ -6,7 +6,7 @@ use canopen::pdo::{Address, MappedObject, Mpdo};
 use canopen::sdo::Multiplexer;
 use canopen::{CobId, Frame, NodeId};
 
-use super::sdo::Event;
+use super::sdo::Transferred;
 use super::{Knowledge, Said, Shown, equals, hex, value};
 use crate::object::{Place, at};
 use crate::tpdo::Tpdo;
@@ -47,7 +47,7 @@ impl Pdos {
     }
 
     /// Takes the value that a transfer has shown.
-    pub(super) fn note(&mut self, node: NodeId, known: &mut Knowledge, event: &Event) {
+    pub(super) fn note(&mut self, node: NodeId, known: &mut Knowledge, event: &Transferred) {
         if let Some(bytes) = event.value() {
             known.tell(event.at, bytes);
             if (0x1400..0x1C00).contains(&event.at.index) {

@@ -58,8 +58,8 @@ enum End {
 
 /// A transfer that has ended.
 #[derive(Debug)]
-pub(super) struct Event {
-    pub(super) at: Multiplexer,
+pub(crate) struct Transferred {
+    pub(crate) at: Multiplexer,
     is_write: bool,
     way: Way,
     end: End,
@@ -71,10 +71,16 @@ pub(super) struct Event {
 
 /// The transfers with the default SDO servers, one at a time for each server.
 #[derive(Debug, Default)]
-pub(super) struct Transfers(BTreeMap<NodeId, Transfer>);
+pub(crate) struct Transfers(BTreeMap<NodeId, Transfer>);
 
 impl Transfers {
-    pub(super) fn on_frame(&mut self, node: NodeId, frame: &Frame, at: Instant) -> Vec<Event> {
+    /// Whether a transfer with the server of a node runs.
+    pub(crate) fn has(&self, node: NodeId) -> bool {
+        self.0.contains_key(&node)
+    }
+
+    /// Takes a request to a server, or a response of it. Returns the transfers that have ended.
+    pub(crate) fn on_frame(&mut self, node: NodeId, frame: &Frame, at: Instant) -> Vec<Transferred> {
         let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { return Vec::new() };
         let is_request = frame.id() >= 0x600;
         if is_request {
@@ -84,7 +90,7 @@ impl Transfers {
         }
     }
 
-    fn request(&mut self, node: NodeId, data: &[u8; 8], now: Instant) -> Vec<Event> {
+    fn request(&mut self, node: NodeId, data: &[u8; 8], now: Instant) -> Vec<Transferred> {
         if let Some(transfer) = self.0.get_mut(&node).filter(|transfer| transfer.raw == Raw::Client)
             && transfer.segment(*data)
         {
@@ -113,12 +119,15 @@ impl Transfers {
         Vec::new()
     }
 
-    fn response(&mut self, node: NodeId, data: [u8; 8], now: Instant) -> Option<Event> {
+    fn response(&mut self, node: NodeId, data: [u8; 8], now: Instant) -> Option<Transferred> {
         let transfer = self.0.get_mut(&node)?;
         if transfer.raw == Raw::Server && transfer.segment(data) {
             return None;
         }
         match Response::parse(data)? {
+            // A response that names another object belongs to a transfer whose request was not on this bus, or is this
+            // program's own.
+            Response::Downloaded(of) | Response::Uploaded(of, _) if of != transfer.at => None,
             Response::Downloaded(_) if transfer.way == Way::Expedited => self.end(node, End::Done, now),
             Response::DownloadedSegment { .. } if transfer.is_sent => self.end(node, End::Done, now),
             Response::Uploaded(_, bytes) => {
@@ -152,7 +161,7 @@ impl Transfers {
         }
     }
 
-    fn end(&mut self, node: NodeId, end: End, now: Instant) -> Option<Event> {
+    fn end(&mut self, node: NodeId, end: End, now: Instant) -> Option<Transferred> {
         self.0.remove(&node).map(|transfer| transfer.ended(end, now))
     }
 }
@@ -220,16 +229,21 @@ impl Transfer {
         self.data.truncate(self.length);
     }
 
-    fn ended(self, end: End, now: Instant) -> Event {
+    fn ended(self, end: End, now: Instant) -> Transferred {
         let Transfer { at, is_write, way, data, length, begun, .. } = self;
-        Event { at, is_write, way, end, data, length, took: now.0.saturating_sub(begun.0) }
+        Transferred { at, is_write, way, end, data, length, took: now.0.saturating_sub(begun.0) }
     }
 }
 
-impl Event {
+impl Transferred {
     /// The bytes that the object has now; `None` where the transfer failed or was too long to keep.
     pub(super) fn value(&self) -> Option<&[u8]> {
         (self.end == End::Done && self.length == self.data.len()).then_some(&self.data)
+    }
+
+    /// The bytes that a client has read.
+    pub(crate) fn read(&self) -> Option<&[u8]> {
+        self.value().filter(|_| !self.is_write)
     }
 
     pub(super) fn say(&self, known: &Knowledge, node: NodeId) -> Said {

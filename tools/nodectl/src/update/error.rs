@@ -16,14 +16,14 @@ pub enum Error {
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The image is for another product. Nothing was changed.
-    #[error("node {}: the image is for product {image:08X}h, the node is product {device:08X}h", .node.get())]
-    Product {
+    /// The image is for another board. Nothing was changed.
+    #[error("node {}: the image is for board {image:08X}h, the node has board {device:08X}h", .node.get())]
+    Board {
         /// The node.
         node: NodeId,
-        /// Product code of the image.
+        /// Board code of the image.
         image: u32,
-        /// Product code of the node, 1018h:2.
+        /// Board code of the node, 2004h:1.
         device: u32,
     },
     /// The node runs a newer version. Nothing was changed.
@@ -60,6 +60,18 @@ pub enum Error {
     /// The node demands an authorisation, and there is no key. Nothing was changed.
     #[error("node {}: it changes its program only for the holder of its key: --authorisation-key", .node.get())]
     Closed {
+        /// The node.
+        node: NodeId,
+    },
+    /// The program of the node is on trial, so the node accepts no other program. Nothing was changed.
+    #[error("node {}: its program is on trial; confirm it or roll it back first (nodectl confirm, nodectl rollback)", .node.get())]
+    OnTrial {
+        /// The node.
+        node: NodeId,
+    },
+    /// The program of the node is on no trial, so there is nothing to confirm or to roll back.
+    #[error("node {}: its program is not on trial", .node.get())]
+    NoTrial {
         /// The node.
         node: NodeId,
     },

@@ -40,8 +40,8 @@ pub struct Image {
 /// The data in the header of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageInfo {
-    /// The product code that the image is for, 1018h:2.
-    pub product: u32,
+    /// The code of the board that the image is for, 2004h:1.
+    pub board: u32,
     /// The version of the image.
     pub version: Version,
     /// The value of 1F56h:1 once the node has the image.
@@ -81,7 +81,7 @@ fn info(bytes: &[u8]) -> Result<ImageInfo, ImageError> {
     }
     let description = header.description();
     let identification = header.code_crc();
-    Ok(ImageInfo { product: description.product, version: description.version, identification })
+    Ok(ImageInfo { board: description.board, version: description.version, identification })
 }
 
 /// The version that a node tells in 100Ah: three numbers, and anything after them.
@@ -100,7 +100,7 @@ mod tests {
     const VERSION: Version = Version { major: 1, minor: 2, patch: 3 };
 
     fn file() -> Vec<u8> {
-        let description = Description { product: 1, hardware: 1, version: VERSION, ..Description::default() };
+        let description = Description { board: 1, hardware: 1, version: VERSION, ..Description::default() };
         let code = [0x5A; 100];
         let header = Header::describe(description, &code).expect("a header");
         [header.encode().as_slice(), &code].concat()
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn a_whole_image_tells_what_it_is() {
         let info = Image::parse(file()).unwrap().info.unwrap();
-        assert_eq!((info.product, info.version), (1, VERSION));
+        assert_eq!((info.board, info.version), (1, VERSION));
     }
 
     #[test]

@@ -4,20 +4,20 @@ use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
 
 use super::image::version;
-use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher};
+use ::update::Refusal;
+
+use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher, trial};
 use crate::bus::BusError;
 use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::{Network, value};
 
-/// The time between two requests to a busy node.
-const POLL: Duration = Duration::from_millis(100);
 /// How long a node may take to restart.
 const RESTART: Duration = Duration::from_millis(15_000);
+/// The time between two requests to a busy node.
+pub(super) const POLL: Duration = Duration::from_millis(100);
 /// How long a node may take to erase the flash, or to check the program.
 const FLASH: Duration = Duration::from_millis(60_000);
-/// How long a node may take to end a trial.
-const CONFIRM: Duration = Duration::from_millis(5_000);
 /// The number of tries to clear the flash when the node refuses although its flash is not busy.
 const CLEARS: usize = 5;
 /// How often a run continues after the node was lost.
@@ -155,25 +155,17 @@ impl<'a> Job<'a> {
         }
         watcher.step(self.node, Step::Confirm);
         self.open(network)?;
-        self.program(network).confirm()?;
-        let until = network.now() + CONFIRM;
-        while self.program(network).is_on_trial()? {
-            if network.now() >= until {
-                return Err(Error::Stuck { node: self.node, what: "confirm the new program" });
-            }
-            network.pause(POLL)?;
-        }
+        trial::confirm(network, self.node, self.options.sdo)?;
         Ok(false)
     }
 
     /// Answers the challenge of a node that demands an authorisation.
     fn open(&self, network: &mut Network) -> Result<(), Error> {
         // Object 2003h is only known for nodes of this project.
-        if self.image.info.is_none() || !self.program(network).is_closed()? {
+        if self.image.info.is_none() {
             return Ok(());
         }
-        let key = self.options.key.as_ref().ok_or(Error::Closed { node: self.node })?;
-        Ok(self.program(network).open(key)?)
+        trial::open(network, self.node, self.options.sdo, self.options.key.as_ref())
     }
 
     /// The error of a node that runs another program than the new one. A node that has taken the new program back tells
@@ -189,9 +181,10 @@ impl<'a> Job<'a> {
     /// Refuses a wrong image before anything is changed.
     fn check(&self, network: &mut Network, now: &State) -> Result<(), Error> {
         let Some(info) = &self.image.info else { return Ok(()) };
-        let device = self.word(network, at(0x1018, 2))?;
-        if device != info.product {
-            return Err(Error::Product { node: self.node, image: info.product, device });
+        // A node without the object leaves the check to its bootloader.
+        let device = self.program(network).board()?.filter(|device| *device != info.board);
+        if let Some(device) = device {
+            return Err(Error::Board { node: self.node, image: info.board, device });
         }
         let running = now.version.as_deref().and_then(version);
         match &now.version {
@@ -209,6 +202,10 @@ impl<'a> Job<'a> {
         is_running: bool,
         watcher: &mut dyn Watcher,
     ) -> Result<(), Error> {
+        // Object 2002h is only known for nodes of this project.
+        if is_running && self.image.info.is_some() && self.program(network).is_on_trial()? {
+            return Err(Error::OnTrial { node: self.node });
+        }
         self.open(network)?;
         if is_running {
             watcher.step(self.node, Step::Stop);
@@ -242,6 +239,9 @@ impl<'a> Job<'a> {
         let until = network.now() + FLASH;
         let mut tries = CLEARS;
         while let Err(error) = self.program(network).command(Command::Clear) {
+            if self.program(network).status()?.is_some_and(is_on_trial) {
+                return Err(Error::OnTrial { node: self.node });
+            }
             tries -= 1;
             let is_late = network.now() >= until;
             if tries == 0 || is_late || error.abort().is_none() {
@@ -274,14 +274,27 @@ impl<'a> Job<'a> {
         });
         match blocks {
             Err(error) if error.abort().is_some_and(sdo::AbortCode::is_protocol) => (),
-            result => return Ok(result?),
+            result => return result.map_err(|error| self.reason(network, error)),
         }
         if arrived > 0 {
             self.clear(network, watcher)?;
         }
         watcher.step(node, Step::DownloadSegments);
         let progress = |done| watcher.progress(node, done, total);
-        Ok(self.program(network).download_segments(&self.image.bytes, progress)?)
+        let segments = self.program(network).download_segments(&self.image.bytes, progress);
+        segments.map_err(|error| self.reason(network, error))
+    }
+
+    /// Why the node has aborted the download, from its status: the abort code has no details.
+    fn reason(&self, network: &mut Network, error: sdo::Error) -> Error {
+        // The node also answers the segments that were on their way.
+        let _ = network.pause(POLL);
+        let is_refused = |status: &Status| !status.busy && status.code != 0;
+        let status = error.abort().and_then(|_| self.program(network).status().ok().flatten());
+        match status.filter(is_refused) {
+            Some(status) => Error::Flash { node: self.node, status },
+            None => error.into(),
+        }
     }
 
     /// Waits until the flash is no longer busy. Fails unless the status then `is_fine`.
@@ -304,15 +317,7 @@ impl<'a> Job<'a> {
         wanted: bool,
         what: &'static str,
     ) -> Result<(), Error> {
-        let until = network.now() + RESTART;
-        while network.now() < until {
-            match self.program(network).is_running() {
-                Ok(is_running) if is_running == wanted => return Ok(()),
-                Err(error) if !error.is_silence() => return Err(error.into()),
-                _ => network.pause(POLL)?,
-            }
-        }
-        Err(Error::Stuck { node: self.node, what })
+        wait_until_running(network, self.node, self.options.sdo, wanted, what)
     }
 
     /// Waits for a lost node. Opens the bus again if the bus is lost, too.
@@ -374,14 +379,28 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn word(&self, network: &mut Network, at: Multiplexer) -> Result<u32, Error> {
-        let bytes = Client::new(network, self.node, self.options.sdo).upload(at)?;
-        Ok(bytes.try_into().map_or(0, u32::from_le_bytes))
-    }
-
     fn program<'n>(&self, network: &'n mut Network) -> Program<'n> {
         Program::new(network, self.node, self.options.sdo)
     }
+}
+
+/// Waits until a node is back from a restart, with or without a running program as `wanted`.
+pub(super) fn wait_until_running(
+    network: &mut Network,
+    node: NodeId,
+    options: sdo::Options,
+    wanted: bool,
+    what: &'static str,
+) -> Result<(), Error> {
+    let until = network.now() + RESTART;
+    while network.now() < until {
+        match Program::new(network, node, options).is_running() {
+            Ok(is_running) if is_running == wanted => return Ok(()),
+            Err(error) if !error.is_silence() => return Err(error.into()),
+            _ => network.pause(POLL)?,
+        }
+    }
+    Err(Error::Stuck { node, what })
 }
 
 /// Tries to open the bus. After a failure it pauses, because the bus may come back; the caller limits the whole time.
@@ -394,6 +413,11 @@ fn reopen(network: &mut Network) {
 /// Whether a status means a valid program that can be started.
 fn is_good(status: Status) -> bool {
     status == Status::GOOD
+}
+
+/// Whether a status means that the program has to be confirmed or taken back first.
+fn is_on_trial(status: Status) -> bool {
+    status.code == Refusal::OnTrial.code()
 }
 
 /// Whether a status means a flash without a program: no error, or no valid program.

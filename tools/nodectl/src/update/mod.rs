@@ -10,6 +10,7 @@ mod fleet;
 mod image;
 mod job;
 mod program;
+mod trial;
 mod watcher;
 
 pub use ::update::{Status, Version};
@@ -20,4 +21,5 @@ pub(crate) use image::version;
 pub use image::{Image, ImageError, ImageInfo};
 pub use job::{Options, Outcome};
 pub use program::{Command, Program};
+pub use trial::{Decision, decide};
 pub use watcher::{Step, Watcher};

@@ -18,13 +18,15 @@ const STATUS: Multiplexer = at(0x1F57, 1);
 const TRIAL_STATE: Multiplexer = at(0x2002, 1);
 const TRIAL_COMMAND: Multiplexer = at(0x2002, 2);
 
+const BOARD: Multiplexer = at(0x2004, 1);
+
 const SERIAL_NUMBER: Multiplexer = at(0x1018, 4);
 const AUTHORISATION_STATE: Multiplexer = at(0x2003, 1);
 const CHALLENGE: Multiplexer = at(0x2003, 2);
 const RESPONSE: Multiplexer = at(0x2003, 3);
 
 /// Names of the objects, for errors.
-const NAMES: [(Multiplexer, &str); 9] = [
+const NAMES: [(Multiplexer, &str); 10] = [
     (DATA, "Program data"),
     (CONTROL, "Program control"),
     (IDENTIFICATION, "Program software identification"),
@@ -34,6 +36,7 @@ const NAMES: [(Multiplexer, &str); 9] = [
     (AUTHORISATION_STATE, "Program authorisation: state"),
     (CHALLENGE, "Program authorisation: challenge"),
     (RESPONSE, "Program authorisation: response"),
+    (BOARD, "Program state: board"),
 ];
 
 /// The portable values of 1F51h.
@@ -75,6 +78,15 @@ impl<'n> Program<'n> {
     /// SDO errors.
     pub fn identification(&mut self) -> Result<Option<u32>, Error> {
         Ok(self.word(IDENTIFICATION)?.filter(|&id| id != 0))
+    }
+
+    /// The code of the board, which the header of an image names. `None` where the node has no such object: only nodes
+    /// of this project have it.
+    ///
+    /// # Errors
+    /// SDO errors.
+    pub fn board(&mut self) -> Result<Option<u32>, Error> {
+        self.word(BOARD)
     }
 
     /// The status of the flash. `None` where the node has no such object.
@@ -130,6 +142,14 @@ impl<'n> Program<'n> {
     /// SDO errors.
     pub fn confirm(&mut self) -> Result<(), Error> {
         self.client(self.options).download(TRIAL_COMMAND, b"conf", |_| ()).map_err(named)
+    }
+
+    /// Withdraws the running program. The node restarts a moment later and restores the previous program.
+    ///
+    /// # Errors
+    /// SDO errors.
+    pub fn roll_back(&mut self) -> Result<(), Error> {
+        self.client(self.options).download(TRIAL_COMMAND, b"back", |_| ()).map_err(named)
     }
 
     /// Sends a command that the node acknowledges.

@@ -25,7 +25,7 @@ const ROWS: &[Object] = &[
     Object::new(0x1017, 0, "", Type::Unsigned16, Access::ReadWrite),
     Object::highest(0x1018, 4, ""),
     read_only(0x1018, 1, Type::Unsigned32).value(7),
-    read_only(0x1018, 2, Type::Unsigned32).value(42),
+    read_only(0x1018, 2, Type::Unsigned32).value(2),
     read_only(0x1018, 3, Type::Unsigned32).value(0x0001_0000),
     read_only(0x1018, 4, Type::Unsigned32).value(SERIAL_NUMBER as i64),
     Object::highest(0x1F50, 1, ""),
@@ -43,6 +43,8 @@ const ROWS: &[Object] = &[
     read_only(0x2003, 1, Type::Unsigned8),
     read_only(0x2003, 2, Type::Unsigned64),
     Object::new(0x2003, 3, "", Type::Unsigned64, Access::WriteOnly).handled(),
+    Object::highest(0x2004, 1, ""),
+    read_only(0x2004, 1, Type::Unsigned32).value(42),
 ];
 
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);

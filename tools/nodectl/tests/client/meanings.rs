@@ -17,7 +17,7 @@ fn an_integer_with_a_unit_has_its_point() {
         let wire = Wire::new(Pressure::of(personality, 1));
         let object = |index: u16| format!("{:04X}:1", index - 0x6000 + first);
         printed(&wire, &["write", &object(0x6132), "2"]);
-        let line = printed(&wire, &["write", &object(0x7148), "250"]);
+        let line = printed(&wire, &["write", &object(0x7148), "2.5"]);
         assert!(line.ends_with("= 2.50 bar\n"), "{line}");
         // A number with a decimal point is the scaled value.
         let line = printed(&wire, &["write", &object(0x7148), "-1.5"]);
@@ -42,8 +42,8 @@ fn a_position_of_a_lift_is_a_length() {
     let wire = Wire::new(Pressure::of(Personality::Lift, 1));
     printed(&wire, &["write", "2302:2", "1234"]);
     assert!(printed(&wire, &["read", "2302:2"]).ends_with("= 1234 mm\n"));
-    printed(&wire, &["write", "6384:1", "50"]);
-    assert!(printed(&wire, &["write", "2302:2", "1235"]).ends_with("= 617.5 mm\n"));
+    printed(&wire, &["write", "6384:1", "--raw", "50"]);
+    assert!(printed(&wire, &["write", "2302:2", "617.5"]).ends_with("= 617.5 mm\n"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Tests of the program as a process: exit codes, and the connection to a bus over TCP.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::thread;
 
@@ -118,6 +118,36 @@ fn slcan_at_a_socketcand_daemon_is_told() {
         error.contains("a socketcand answers there: the address is socketcand://HOST:PORT/BUS"),
         "{error}"
     );
+}
+
+/// An adapter needs time for a frame, does not tell when it has sent the frame, and drops it when it is closed.
+#[test]
+fn the_channel_of_a_slow_adapter_is_closed_when_its_frames_are_sent() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("slcan://{}", listener.local_addr().expect("an address"));
+    for _ in 0..3 {
+        let listener = listener.try_clone().expect("a port");
+        let adapter = thread::spawn(move || sent_by_adapter(&listener.accept().expect("a client").0));
+        let (code, _, error) = nodectl(&address, &["--bit-rate", "10", "nmt", "preop", "--no-wait"]);
+        assert_eq!((code, error.as_str()), (0, ""));
+        assert_eq!(adapter.join().expect("an adapter"), ["t00028001"]);
+    }
+}
+
+/// The frames that an adapter at 10 kbit/s has sent before its channel is closed.
+fn sent_by_adapter(stream: &TcpStream) -> Vec<String> {
+    const FRAME: std::time::Duration = std::time::Duration::from_millis(13);
+    let (mut sent, mut waiting) = (Vec::new(), Vec::new());
+    for line in std::io::BufReader::new(stream).split(b'\r').map_while(Result::ok) {
+        let line = String::from_utf8(line).expect("text");
+        let now = std::time::Instant::now();
+        match line.chars().next() {
+            Some('t') => waiting.push((line, now + FRAME)),
+            Some('C') => sent.extend(waiting.drain(..).filter(|(_, at)| *at <= now).map(|(line, _)| line)),
+            _ => (),
+        }
+    }
+    sent
 }
 
 /// A daemon with a node, for the time of the test. Returns its address.

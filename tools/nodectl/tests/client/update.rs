@@ -44,7 +44,7 @@ fn program(version: &str) -> Vec<u8> {
 
 fn image(version: Version) -> Image {
     let bytes = program(&version.to_string());
-    let info = ImageInfo { product: 42, version, identification: identification(&bytes) };
+    let info = ImageInfo { board: 42, version, identification: identification(&bytes) };
     Image { bytes, info: Some(info) }
 }
 
@@ -146,6 +146,9 @@ fn a_program_on_trial_is_confirmed_unless_that_is_not_wanted() {
     let left = Options { confirm: false, force: true, ..options() };
     let outcome = one(&wire, &image(OLD), &left, &mut Diary::default()).unwrap();
     assert!(outcome.is_on_trial && wire.station(|loaders| loaders[0].flash().is_on_trial));
+    let error = one(&wire, &image(NEW), &options(), &mut Diary::default()).unwrap_err();
+    assert!(matches!(error, Error::OnTrial { .. }), "another program is refused: {error}");
+    assert_eq!(commands(&wire).last(), Some(&1), "the program runs");
     // A later update that finds the program on the node ends its trial.
     let outcome = one(&wire, &image(OLD), &options(), &mut Diary::default()).unwrap();
     assert!(!outcome.is_on_trial && !outcome.is_changed);
@@ -188,12 +191,9 @@ fn a_node_that_has_it_is_left_alone_unless_forced() {
 fn what_would_do_harm_is_refused_before_anything_is_erased() {
     let wire = fleet(&[3]);
     let mut other = image(NEW);
-    other.info.as_mut().unwrap().product = 43;
+    other.info.as_mut().unwrap().board = 43;
     let error = one(&wire, &other, &options(), &mut Diary::default()).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "node 3: the image is for product 0000002Bh, the node is product 0000002Ah"
-    );
+    assert_eq!(error.to_string(), "node 3: the image is for board 0000002Bh, the node has board 0000002Ah");
     let older = image(Version { major: 0, minor: 9, patch: 0 });
     let error = one(&wire, &older, &options(), &mut Diary::default()).unwrap_err();
     assert_eq!(error.to_string(), "node 3: the node runs version 1.0.0, which is newer than 0.9.0");
@@ -203,7 +203,7 @@ fn what_would_do_harm_is_refused_before_anything_is_erased() {
         one(&wire, &older, &force, &mut Diary::default()).unwrap().new_version.as_deref(),
         Some("0.9.0")
     );
-    assert!(matches!(one(&wire, &other, &force, &mut Diary::default()), Err(Error::Product { .. })));
+    assert!(matches!(one(&wire, &other, &force, &mut Diary::default()), Err(Error::Board { .. })));
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn a_program_that_the_node_does_not_like_is_told_in_words() {
     for (word, words) in [
         (0x0006, "format or CRC error"),
         (0x000E, "the flash is secured"),
-        (0x0005_0080, "the image is for another product"),
+        (0x0005_0080, "the image is for another board"),
     ] {
         let wire = fleet(&[3]);
         wire.station(|loaders| loaders[0].flash().verdict = word);

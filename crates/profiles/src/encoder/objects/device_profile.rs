@@ -52,7 +52,7 @@ const PARAMETERS: &[Object] = &[
     handled(0x6000, 0, "Operating parameters", Type::Unsigned16),
     handled(0x6001, 0, "Measuring units per revolution", Type::Unsigned32).value(4096).unit("units"),
     handled(0x6002, 0, "Total measuring range", Type::Unsigned32).value(4096 * 4096).unit("units"),
-    handled(0x6003, 0, "Preset value", Type::Unsigned32).unit("units"),
+    handled(0x6003, 0, "Preset value", Type::Unsigned32).unit("units").acts(),
     measured(0x6004, 0, "Position value", Type::Unsigned32).unit("units"),
     Object::highest(0x6005, 2, "Linear measuring steps"),
     handled(0x6005, 1, "Position measuring step", Type::Unsigned32).value(10_000).unit("nm"),
@@ -61,8 +61,8 @@ const PARAMETERS: &[Object] = &[
         .value(100)
         .unit("0.01 mm/s"),
     Object::highest(0x6010, 2, "Preset values by channel"),
-    handled(0x6010, 1, "Preset value channel 1", Type::Integer32).unit("units"),
-    handled(0x6010, 2, "Preset value channel 2", Type::Integer32).unit("units"),
+    handled(0x6010, 1, "Preset value channel 1", Type::Integer32).unit("units").acts(),
+    handled(0x6010, 2, "Preset value channel 2", Type::Integer32).unit("units").acts(),
 ];
 
 const POSITION: [Object; 3] = values(

@@ -71,8 +71,8 @@ impl Profile for Objects {
         Objects { fields }
     }
 
-    fn initialise(&mut self, image: &mut [u8]) {
-        self.fields.initialise(image);
+    fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
+        self.fields.initialise(image, is_stored);
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {

@@ -46,7 +46,7 @@ const fn operating(sub: u8, name: &'static str) -> Object {
 }
 
 const fn preset(sub: u8, name: &'static str) -> Object {
-    taken(handled(0x6382, sub, name, Type::Unsigned32)).unit(POSITION)
+    taken(handled(0x6382, sub, name, Type::Unsigned32)).unit(POSITION).acts()
 }
 
 const fn position(sub: u8, name: &'static str) -> Object {
@@ -152,6 +152,6 @@ pub(super) const PARTS: &[&[Object]] = &[
         limit(2, "Half load limit"),
         limit(3, "Full load limit"),
         limit(4, "Overload limit"),
-        taken(handled(0x6486, 0, "Car reference weight", Type::Unsigned16)).unit("kg"),
+        taken(handled(0x6486, 0, "Car reference weight", Type::Unsigned16)).unit("kg").acts(),
     ],
 ];

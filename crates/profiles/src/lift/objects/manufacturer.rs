@@ -5,6 +5,9 @@ use crate::lift::devices::Devices;
 use crate::lift::position::UNKNOWN;
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
+/// Index of the object with the TPDOs that a client has switched off.
+pub const SWITCHED_OFF: u16 = 0x2307;
+
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
     Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
@@ -67,6 +70,10 @@ pub(super) const OBJECTS: &[Object] = &[
     Object::highest(0x2306, 2, "Sensor references"),
     Object::new(0x2306, 1, "Sensor 1 references", Type::Unsigned8, Access::ReadOnly),
     Object::new(0x2306, 2, "Sensor 2 references", Type::Unsigned8, Access::ReadOnly),
+    // One bit for each: 0 for 1901h, 1 to 4 for 1906h, 1907h, 1980h and 1981h. Part of the communication parameters, like
+    // the COB-IDs themselves.
+    Object::new(SWITCHED_OFF, 0, "TPDOs switched off by a client", Type::Unsigned8, Access::ReadOnly)
+        .stored(Group::Communication),
     Object::highest(0x2310, 2, "Load filter"),
     // Codes as in 61A0h and 61A1h of CiA 404.
     parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),

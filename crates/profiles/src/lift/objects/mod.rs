@@ -12,6 +12,8 @@ mod rules;
 mod sensors;
 mod values;
 
+pub use choice::UNKNOWN_CHOICES;
+pub use manufacturer::SWITCHED_OFF;
 pub use values::Fields;
 
 use canopen::dictionary::{self, Dictionary, Entry, Object};
@@ -82,7 +84,7 @@ impl Profile for Objects {
         Objects { fields, calls: Calls::default(), lamps: panel::LampStates::default() }
     }
 
-    fn initialise(&mut self, image: &mut [u8]) {
+    fn initialise(&mut self, image: &mut [u8], _is_stored: bool) {
         self.fields.initialise(image);
     }
 
@@ -129,7 +131,9 @@ impl Profile for Objects {
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         match (entry.index(), entry.sub()) {
             (0x6011, 0) => self.follow_output(image),
+            (0x2320, sub @ 1..) => self.fields.panel.replace_word(usize::from(sub - 1) / 2, image),
             (0x2322, sub @ 1..) => self.lamps.forget(usize::from(sub) - 1),
+            (index @ 0x1901..=0x1981, 1) => self.fields.note_switch(index, image),
             _ => {}
         }
     }

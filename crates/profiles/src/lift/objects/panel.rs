@@ -10,6 +10,8 @@ use canopen::dictionary::{Dictionary, Field};
 pub(super) struct PanelFields {
     input: Field,
     output: Field,
+    /// 6100h: the words with the public structure.
+    inputs: [Field; BUTTONS],
     /// The words of a button while it is released and while it is pressed.
     buttons: [[Field; 2]; BUTTONS],
     /// 6120h: bit 0, the input is used.
@@ -34,6 +36,7 @@ impl PanelFields {
         PanelFields {
             input: d.field(0x6010, 0),
             output: d.field(0x6011, 0),
+            inputs: pair(d, 0x6100, 1),
             buttons: [pair(d, 0x2320, 1), pair(d, 0x2320, 3)],
             enabled: pair(d, 0x6120, 1),
             lamp_words: [pair(d, 0x2321, 1), pair(d, 0x2321, 3)],
@@ -60,14 +63,40 @@ impl PanelFields {
         false
     }
 
-    /// 6100h: for an input with the public structure, the words of its two states differ in the state alone.
+    /// 6100h: for an input with the public structure, the words of its two states differ in the state alone. A value of 0
+    /// takes these words away, and leaves other words of 2320h alone.
     #[inline(never)]
     pub(super) fn take_input(&self, button: usize, bytes: &[u8], image: &mut [u8]) {
-        let (Some([released, pressed]), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else {
+        let (Some([released, pressed]), Ok(new)) = (self.buttons.get(button), bytes.try_into()) else {
             return;
         };
-        released.set(image, &Word(word).with_state(false).0);
-        pressed.set(image, &Word(word).with_state(true).0);
+        let new = Word(new);
+        if new == Word::default() && !self.follows_input(button, image) {
+            return;
+        }
+        released.set(image, &new.with_state(false).0);
+        pressed.set(image, &new.with_state(new != Word::default()).0);
+    }
+
+    /// Whether the words of a button are those of its input in 6100h.
+    #[inline(never)]
+    fn follows_input(&self, button: usize, image: &[u8]) -> bool {
+        let (Some([released, pressed]), Some(input)) = (self.buttons.get(button), self.inputs.get(button))
+        else {
+            return false;
+        };
+        let input = word(*input, image);
+        word(*released, image) == input.with_state(false) && word(*pressed, image) == input.with_state(true)
+    }
+
+    /// 2320h has been written. Words that are not those of 6100h replace that input.
+    #[inline(never)]
+    pub(super) fn replace_word(&self, button: usize, image: &mut [u8]) {
+        if !self.follows_input(button, image)
+            && let Some(input) = self.inputs.get(button)
+        {
+            input.set(image, &[0; 6]);
+        }
     }
 
     /// Handles a command in the virtual output that asks inputs for their states.

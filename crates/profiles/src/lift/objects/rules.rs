@@ -95,6 +95,8 @@ impl Fields {
         let offset = self.position_parameters(image).preset(number, position, preset);
         unit.offset.store(image, offset.ok_or(Abort::InvalidValue)?.to_le_bytes());
         unit.position.store(image, preset.to_le_bytes());
+        // Another preset before the next sample starts from this one.
+        unit.reading.store(image, preset.to_le_bytes());
         // 0 appears only before the first preset.
         let references = source.of(&self.references);
         references.store(image, [references.u8(image).checked_add(1).unwrap_or(1)]);
@@ -121,7 +123,7 @@ impl Fields {
         if bytes != field.get(image) {
             self.unit(number)?.offset.store(image, [0; 4]);
         }
-        self.switch_position(number, bytes != [0] && self.devices(image).has(Devices::POSITION), image);
+        self.switch_position(number, bytes != [0], image);
         Ok(())
     }
 

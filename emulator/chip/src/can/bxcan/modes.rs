@@ -79,7 +79,7 @@ impl BxCan {
     /// Leaves the bus, as soon as the frame on the wire has ended.
     fn stop(&mut self, mode: Mode) {
         let in_frame = self.is_on_bus() && self.monitor.is_busy() || self.looped.is_some();
-        if in_frame || self.mode == mode && !self.monitor.is_waiting() {
+        if self.is_held || in_frame || self.mode == mode && !self.monitor.is_waiting() {
             return;
         }
         self.monitor.cancel();

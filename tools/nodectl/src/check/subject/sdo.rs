@@ -352,6 +352,7 @@ fn judged<T>(
         Ok(value) => Ok(Ok(value)),
         Err(error) => match error.cause {
             Cause::Transfer(Error::Abort(code)) => Ok(Err(Refusal(code.0))),
+            Cause::Busy => Err(skip("another client uses the SDO server of the device")),
             Cause::Transfer(cause) => Err(fail(format!("{expected} of {}", Place(error.at)), cause)),
             Cause::Bus(error) => Err(error.into()),
         },

@@ -15,6 +15,7 @@ use super::output::hex;
 use super::{Failure, Session};
 use crate::heartbeat;
 use crate::lss::{Master, Selection};
+use crate::text::note;
 
 /// The minimum time to wait for a node that boots with a new node-ID.
 const BOOT: Duration = Duration::from_millis(2000);
@@ -99,7 +100,7 @@ impl Lss {
             booted(session, id)?;
         }
         if let Some((_, false)) = done.new_id() {
-            eprintln!("in force after `nodectl nmt reset-comm`");
+            note("in force after `nodectl nmt reset-comm`");
         }
         done.print(session)
     }

@@ -10,6 +10,7 @@ use crate::cli::{Failure, Session};
 use crate::lss::Master;
 use crate::object::at;
 use crate::scan::{Presence, scan};
+use crate::text::note;
 
 /// How long to listen for heartbeats, which usually come once a second.
 const LISTEN: Duration = Duration::from_millis(1200);
@@ -23,7 +24,7 @@ pub(super) fn configured(session: &mut Session) -> Result<BTreeMap<NodeId, Prese
 
 /// The identity of the only node on the bus.
 pub(super) fn only(session: &mut Session) -> Result<Identity, Failure> {
-    eprintln!("no --select: looking who is on the bus");
+    note("no --select: looking who is on the bus");
     let configured: Vec<NodeId> = configured(session)?.into_keys().collect();
     let unconfigured = unconfigured(session)?;
     match (&configured[..], &unconfigured[..]) {

@@ -20,7 +20,7 @@ pub(super) struct Scan {
     /// How long each of the 133 steps may take, in milliseconds; a tenth of --timeout if it is left out.
     #[arg(long, value_name = "MS")]
     step: Option<u32>,
-    /// Give the nodes node-IDs from this one on, without those in use; by default only the first node is found.
+    /// Give the nodes node-IDs from this one on, without those in use; without it, all nodes are listed and stay as they are.
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     assign: Option<u8>,
     /// Make the nodes keep their node-IDs.
@@ -30,41 +30,72 @@ pub(super) struct Scan {
 
 impl Scan {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        let mut free = self.free(session)?;
-        let mut found = 0;
-        while let Some(identity) = self.find(session)? {
-            found += 1;
-            let id = self.assign.map(|first| free.pop_front().ok_or(first)).transpose();
-            let id = id.map_err(|first| Failure::Usage(format!("no node-ID from {first} on is free")));
-            let configured = id.and_then(|id| self.configure(session, id).map(|()| id));
-            Master::new(&mut session.network, session.options.timeout()).release()?;
-            let id = configured?;
-            if let Some(id) = id {
-                booted(session, id)?;
-            }
-            session.print(&slave(identity, id))?;
-            if id.is_none() {
-                return Ok(());
-            }
-        }
+        let found = match self.assign {
+            Some(first) => self.assign_all(session, first)?,
+            None => self.list(session)?,
+        };
         match found {
             0 => Err(Failure::Silence("no node without a node-ID answers".to_owned())),
             _ => Ok(()),
         }
     }
 
-    /// Free node-IDs.
-    fn free(&self, session: &mut Session) -> Result<VecDeque<NodeId>, Failure> {
-        let Some(first) = self.assign else { return Ok(VecDeque::new()) };
+    /// Gives all nodes node-IDs. Returns their number.
+    fn assign_all(&self, session: &mut Session, first: u8) -> Result<usize, Failure> {
+        let mut free = Scan::free(session, first)?;
+        let mut found = 0;
+        while let Some(identity) = self.find(session)? {
+            found += 1;
+            let id = free.pop_front();
+            let id = id.ok_or_else(|| Failure::Usage(format!("no node-ID from {first} on is free")));
+            let configured = id.and_then(|id| self.configure(session, id).map(|()| id));
+            Master::new(&mut session.network, session.options.timeout()).release()?;
+            let id = configured?;
+            booted(session, id)?;
+            session.print(&slave(identity, Some(id)))?;
+        }
+        Ok(found)
+    }
+
+    /// Lists all nodes. A found node stays selected until the end, and takes no part in the search for the next one.
+    fn list(&self, session: &mut Session) -> Result<usize, Failure> {
+        let mut found = Vec::new();
+        let mut next = self.find(session);
+        while let Ok(Some(identity)) = next {
+            // The search itself may have released the nodes.
+            if found.contains(&identity) {
+                break;
+            }
+            found.push(identity);
+            session.print(&slave(identity, None))?;
+            next = self.following(session);
+        }
+        Master::new(&mut session.network, session.options.timeout()).release()?;
+        next.map(|_| found.len())
+    }
+
+    /// The next node while the former ones stay selected. Silence is asked once more, with longer steps.
+    fn following(&self, session: &mut Session) -> Result<Option<Identity>, Failure> {
+        let (step, bar) = (step(session, self.step), bar());
+        let mut search =
+            |step| Master::new(&mut session.network, step).fastscan(|asked| bar.set_position(asked.into()));
+        let found = match search(step)? {
+            Some(identity) => Some(identity),
+            None => search(canopen::Duration(2 * step.0))?,
+        };
+        bar.finish_and_clear();
+        Ok(found)
+    }
+
+    /// Free node-IDs from one on.
+    fn free(session: &mut Session, first: u8) -> Result<VecDeque<NodeId>, Failure> {
         let used = only::configured(session)?;
         Ok((first..=127).filter_map(NodeId::new).filter(|id| !used.contains_key(id)).collect())
     }
 
-    fn configure(&self, session: &mut Session, id: Option<NodeId>) -> Result<(), Failure> {
+    fn configure(&self, session: &mut Session, id: NodeId) -> Result<(), Failure> {
         let mut master = Master::new(&mut session.network, session.options.timeout());
-        if id.is_some() {
-            master.set_node_id(id)?;
-        }
+        master.set_node_id(Some(id))?;
         if self.store {
             master.store()?;
         }

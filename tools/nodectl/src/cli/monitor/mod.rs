@@ -19,7 +19,7 @@ use super::read::place;
 use super::{Failure, Output, Session};
 use crate::acquisition::{Acquisition, Sample, Setup, Signal};
 use crate::object::Place;
-use crate::text::visible;
+use crate::text::{note, visible};
 use crate::value::Value;
 
 /// A hint is printed after this time without a value.
@@ -124,7 +124,7 @@ impl Monitor {
             let until = acquisition.now() + SILENCE;
             let Some(sample) = acquisition.next(until)? else {
                 let hint = acquisition.hint().filter(|_| !std::mem::replace(&mut hinted, true));
-                hint.iter().for_each(|hint| eprintln!("{hint}"));
+                hint.iter().for_each(note);
                 continue;
             };
             let start = *start.get_or_insert(sample.at);

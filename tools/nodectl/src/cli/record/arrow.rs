@@ -11,9 +11,9 @@ use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 
 use super::rows::{Row, Sink, title};
+use super::target::Target;
 use crate::acquisition::{Kind, Signal};
 use crate::cli::Failure;
-use crate::cli::replacement::Replacement;
 use crate::object::Place;
 use crate::value::Value;
 
@@ -22,7 +22,7 @@ const BATCH: usize = 1024;
 
 /// A stream that is written batch by batch.
 pub(super) struct Arrow {
-    to: StreamWriter<Replacement>,
+    to: StreamWriter<Target>,
     schema: Arc<Schema>,
     seconds: Float64Builder,
     columns: Vec<Column>,
@@ -39,7 +39,7 @@ enum Column {
 
 impl Arrow {
     /// A stream with the names and types of its columns. The metadata of a column are `object` and `unit`.
-    pub(super) fn new(to: Replacement, signals: &[Signal]) -> Result<Arrow, Failure> {
+    pub(super) fn new(to: Target, signals: &[Signal]) -> Result<Arrow, Failure> {
         let time = Field::new("time s", DataType::Float64, false);
         let fields: Vec<_> = std::iter::once(time).chain(signals.iter().map(field)).collect();
         let schema = Arc::new(Schema::new(fields));

@@ -20,11 +20,11 @@ pub(super) use self::plot::range;
 pub(super) use self::rows::seconds as seconds_between;
 use self::rows::{Rows, Sink};
 use self::table::Table;
-use self::target::Target;
+use self::target::{Target, is_standard};
 use super::monitor::Source;
-use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::acquisition::{Acquisition, Sample, Signal};
+use crate::text::note;
 
 /// The longest wait for a value, after which the end of the recording is checked.
 const WAKE: Duration = Duration::from_millis(50);
@@ -42,11 +42,12 @@ pub(super) struct Record {
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Duration>,
 
-    /// Table of the values, one row for each time; to the standard output if there is no other file.
+    /// Table of the values, one row for each time ("-" for the standard output); to the standard output if there is no
+    /// other file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
-    /// The same table as a stream of Apache Arrow, for recordings of days.
+    /// The same table as a stream of Apache Arrow ("-" for the standard output), for recordings of days.
     #[arg(long, value_name = "FILE")]
     arrow: Option<PathBuf>,
 
@@ -68,8 +69,11 @@ impl Record {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         // Open all files before the recording, so that a file that cannot be written is reported at once.
         let files = [&self.csv, &self.arrow, &self.svg];
-        let [csv, arrow, svg] = files.map(|path| path.as_deref().map(Replacement::open).transpose());
+        let [csv, arrow, svg] = files.map(|path| path.as_deref().map(Target::open).transpose());
         let (csv, arrow, svg) = (csv?, arrow?, svg?);
+        if files.into_iter().flatten().filter(|path| is_standard(path)).count() > 1 {
+            return Err(Failure::Usage("the standard output takes one of the files".to_owned()));
+        }
         let (mut acquisition, _) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
         let mut rows = Rows::new(&signals, sinks(&signals, csv, arrow, svg)?);
@@ -90,12 +94,13 @@ impl Record {
 
     /// Prints the files that were written.
     fn tell(&self, rows: usize) {
-        let tables =
-            self.csv.iter().chain(&self.arrow).map(|path| format!("{rows} rows in {}", path.display()));
-        let svg = self.svg.iter().map(|path| format!("a plot in {}", path.display()));
+        let is_file = |path: &&PathBuf| !is_standard(path);
+        let tables = self.csv.iter().chain(&self.arrow).filter(is_file);
+        let tables = tables.map(|path| format!("{rows} rows in {}", path.display()));
+        let svg = self.svg.iter().filter(is_file).map(|path| format!("a plot in {}", path.display()));
         let written: Vec<String> = tables.chain(svg).collect();
         if !written.is_empty() {
-            eprintln!("{}", written.join(", "));
+            note(written.join(", "));
         }
     }
 }
@@ -103,12 +108,12 @@ impl Record {
 /// The destinations of the rows: all files, or the standard output when there are no files.
 fn sinks(
     signals: &[Signal],
-    csv: Option<Replacement>,
-    arrow: Option<Replacement>,
-    svg: Option<Replacement>,
+    csv: Option<Target>,
+    arrow: Option<Target>,
+    svg: Option<Target>,
 ) -> Result<Vec<Box<dyn Sink>>, Failure> {
     let has_other = arrow.is_some() || svg.is_some();
-    let csv = csv.map(Target::File).or_else(|| (!has_other).then(|| Target::Standard(io::stdout())));
+    let csv = csv.or_else(|| (!has_other).then(|| Target::Standard(io::stdout())));
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     if let Some(target) = csv {
         sinks.push(Box::new(Table::new(target, signals)?));

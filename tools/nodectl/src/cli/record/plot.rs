@@ -8,9 +8,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::rows::{Row, Sink, title};
+use super::target::Target;
 use crate::acquisition::Signal;
 use crate::cli::Failure;
-use crate::cli::replacement::Replacement;
 use crate::value::Value;
 
 const WIDTH: u32 = 1000;
@@ -31,14 +31,14 @@ struct Chart {
 
 /// Draws all signals with numbers in charts on one time axis, once all rows have come.
 pub(super) struct Plot {
-    to: Replacement,
+    to: Target,
     /// One line for each signal.
     lines: Vec<Line>,
     units: Vec<String>,
 }
 
 impl Plot {
-    pub(super) fn new(to: Replacement, signals: &[Signal]) -> Plot {
+    pub(super) fn new(to: Target, signals: &[Signal]) -> Plot {
         let lines = signals.iter().map(|signal| Line { title: title(signal), points: vec![] }).collect();
         Plot { to, lines, units: signals.iter().map(|signal| signal.unit.clone()).collect() }
     }

@@ -1,6 +1,7 @@
 //! The destination of a table.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use crate::cli::Failure;
 use crate::cli::replacement::Replacement;
@@ -11,7 +12,20 @@ pub(super) enum Target {
     Standard(io::Stdout),
 }
 
+/// Whether a path stands for the standard output.
+pub(super) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
 impl Target {
+    /// Opens a file; "-" is the standard output.
+    pub(super) fn open(path: &Path) -> Result<Target, Failure> {
+        if is_standard(path) {
+            return Ok(Target::Standard(io::stdout()));
+        }
+        Replacement::open(path).map(Target::File)
+    }
+
     /// Finishes the file.
     pub(super) fn complete(self) -> Result<(), Failure> {
         match self {

@@ -32,8 +32,8 @@ use crate::bus::Address;
 /// Shows the bus in a browser: the nodes, live values, dictionary, trace, commissioning, update.
 ///
 /// The page is for this machine only, unless --page gives an address that other machines reach. Other machines need the
-/// token in the printed address. Without --silent, the command looks for nodes at its start, and asks every node for
-/// its identity.
+/// token in the printed address. Nothing is sent while no page is open. While one is open, unknown nodes without another
+/// client are asked for their identity, unless --silent is given.
 #[derive(Debug, Args)]
 pub(super) struct Serve {
     /// The bus; that of --bus if it is left out.

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use canopen::emcy::Message;
 use canopen::nmt::State;
+use canopen::sdo::Multiplexer;
 use canopen::{Frame, NodeId};
 use serde::Serialize;
 
 use super::status::Count;
 use crate::heartbeat::{self, Heartbeat};
-use crate::{Catalogue, meaning};
+use crate::{Catalogue, meaning, value};
 
 /// The number of missing heartbeats after which a node counts as absent.
 const MISSED: f64 = 3.0;
@@ -30,6 +31,38 @@ pub(super) struct Identity {
     pub(super) serial: Option<u32>,
     pub(super) version: Option<String>,
     pub(super) hardware: Option<String>,
+    /// Why the data sheet that the user has named is not used for the node.
+    pub(super) note: Option<String>,
+}
+
+impl Identity {
+    /// Takes a value that another client has read. Returns whether the value is a part of the identity that was not
+    /// known.
+    pub(super) fn hear(&mut self, at: Multiplexer, bytes: &[u8]) -> bool {
+        let before = self.clone();
+        let word = || bytes.try_into().ok().map(u32::from_le_bytes);
+        let text = || Some(value::text(bytes));
+        match (at.index, at.sub) {
+            (0x1000, 0) => self.device_type = word(),
+            (0x1018, 1) => self.vendor = word(),
+            (0x1018, 2) => self.product = word(),
+            (0x1018, 3) => self.revision = word(),
+            (0x1018, 4) => self.serial = word(),
+            (0x1008, 0) => self.name = text(),
+            (0x1009, 0) => self.hardware = text(),
+            (0x100A, 0) => self.version = text(),
+            _ => return false,
+        }
+        let device = self.vendor.zip(self.product);
+        self.personality = device.and_then(|(vendor, product)| Catalogue::device_name(vendor, product));
+        self.data_sheet |= self.personality.is_some();
+        *self != before
+    }
+
+    /// The built-in data sheet of the device.
+    pub(super) fn catalogue(&self) -> Option<Catalogue> {
+        Catalogue::built_in(self.vendor?, self.product?)
+    }
 }
 
 /// An emergency message.
@@ -49,6 +82,10 @@ pub(super) struct Node {
     /// The time of the last request for the identity of the node; `None` if the node has to be asked.
     pub(super) asked: Option<f64>,
     pub(super) updating: bool,
+    /// Whether another client talks to the node.
+    pub(super) other_client: bool,
+    /// The time of the last boot-up message.
+    booted: Option<f64>,
     state: Option<State>,
     seen: f64,
     heartbeat: Option<f64>,
@@ -90,6 +127,7 @@ struct Row<'n> {
     frames: f64,
     load: f64,
     updating: bool,
+    other_client: bool,
 }
 
 /// All nodes.
@@ -175,6 +213,16 @@ impl Node {
         self.state
     }
 
+    /// Whether the identity of the node is not known, or in parts only.
+    pub(super) fn is_unknown(&self) -> bool {
+        self.identity.as_ref().is_none_or(|identity| identity.device_type.is_none())
+    }
+
+    /// The time since the last boot-up message in seconds; without one, it is long ago.
+    pub(super) fn since_boot(&self, t: f64) -> f64 {
+        self.booted.map_or(f64::INFINITY, |booted| t - booted)
+    }
+
     fn on_emergency(&mut self, node: NodeId, frame: &Frame, t: f64) -> Option<News> {
         let message = Message::parse(frame.data().try_into().ok()?);
         let emergency = Emergency {
@@ -199,7 +247,7 @@ impl Node {
         self.is_new = true;
         if is_boot {
             // After a boot the node may have another program or be another device: ask again.
-            (self.asked, self.emergency) = (None, None);
+            (self.asked, self.emergency, self.booted) = (None, None, Some(t));
         }
         Some(News::State { node: node.get(), t, state: heartbeat::words(heard.state) })
     }
@@ -216,6 +264,7 @@ impl Node {
             frames: self.frames,
             load: self.load,
             updating: self.updating,
+            other_client: self.other_client,
         }
     }
 }
@@ -245,6 +294,20 @@ mod tests {
 
     fn frame(id: u16, data: &[u8]) -> Frame {
         Frame::new(id, data).unwrap()
+    }
+
+    #[test]
+    fn an_identity_is_learned_from_what_other_clients_read() {
+        let mut identity = Identity::default();
+        let at = crate::object::at;
+        assert!(!identity.hear(at(0x1017, 0), &[1, 0]));
+        assert!(identity.hear(at(0x1000, 0), &0x0002_0194_u32.to_le_bytes()));
+        assert!(identity.hear(at(0x1018, 1), &product::VENDOR_ID.to_le_bytes()));
+        assert!(identity.catalogue().is_none());
+        assert!(identity.hear(at(0x1018, 2), &1_u32.to_le_bytes()));
+        assert_eq!(identity.personality.as_deref(), Some("pressure"));
+        assert!(identity.data_sheet && identity.catalogue().is_some());
+        assert!(!identity.hear(at(0x1018, 2), &1_u32.to_le_bytes()), "nothing new");
     }
 
     fn row(nodes: &Nodes) -> serde_json::Value {

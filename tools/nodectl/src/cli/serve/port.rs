@@ -6,6 +6,7 @@ use canopen::{Frame, Instant, NodeId};
 
 use super::pump::Order;
 use crate::bus::{Bus, BusError, NoBus, Received, clock};
+use crate::sdo::Channel;
 
 /// The number of frames that may wait for a job. A slower job loses the newest frames, as with any adapter.
 const WAITING: usize = 4096;
@@ -13,9 +14,9 @@ const WAITING: usize = 4096;
 /// The frames that a job receives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interest {
-    /// Frames of this node: answers of its SDO server, and heartbeats.
-    Node(NodeId),
-    /// SDO answers and heartbeats of all nodes, and answers of LSS slaves.
+    /// Frames of and for this node: SDO on its channel, also of other clients, and heartbeats.
+    Node(NodeId, Channel),
+    /// SDO and heartbeats of all nodes, and answers of LSS slaves.
     Services,
 }
 
@@ -23,9 +24,11 @@ impl Interest {
     /// Whether a frame belongs to this interest.
     pub(super) fn has(self, frame: &Frame) -> bool {
         let id = frame.id();
-        let is_service = matches!(id, 0x581..=0x5FF | 0x701..=0x77F);
+        let is_service = matches!(id, 0x581..=0x5FF | 0x601..=0x67F | 0x701..=0x77F);
         match self {
-            Interest::Node(node) => is_service && id & 0x7F == u16::from(node.get()),
+            Interest::Node(node, channel) => {
+                (is_service && id & 0x7F == u16::from(node.get())) || channel.has(frame)
+            }
             Interest::Services => is_service || id == 0x7E4,
         }
     }
@@ -38,6 +41,13 @@ pub(super) struct Outlet {
 }
 
 impl Outlet {
+    /// Takes the channel that a job has chosen for a node.
+    pub(super) fn choose(&mut self, node: NodeId, channel: Channel) {
+        if matches!(self.interest, Interest::Node(of, _) if of == node) {
+            self.interest = Interest::Node(node, channel);
+        }
+    }
+
     /// Passes a frame to the job, if the frame interests it. Returns `false` when the job has ended.
     pub(super) fn hand_over(&self, received: &Received) -> bool {
         use std::sync::mpsc::TrySendError;

@@ -54,9 +54,12 @@ impl<J> Schedule<J> {
     }
 
     /// A job that may begin now, with its number. Older jobs of the same lane come first. Later jobs do not overtake an
-    /// urgent older one, so that a job that needs everything gets its turn.
-    pub(super) fn next(&mut self) -> Option<(u64, J)> {
-        let place = (0..self.waiting.len()).find(|&place| self.may_begin(place))?;
+    /// urgent older one, so that a job that needs everything gets its turn. A job of a node waits while another client
+    /// of the bus uses the SDO server of the node.
+    pub(super) fn next(&mut self, is_used: impl Fn(NodeId) -> bool) -> Option<(u64, J)> {
+        let is_free = |lane: Lane| !matches!(lane, Lane::Node(node) if is_used(node));
+        let place =
+            (0..self.waiting.len()).find(|&place| is_free(self.waiting[place].0) && self.may_begin(place))?;
         let (lane, haste, job) = self.waiting.remove(place);
         self.next += 1;
         self.running.push((self.next, lane, haste));
@@ -99,7 +102,7 @@ mod tests {
     }
 
     fn begun(schedule: &mut Schedule<&'static str>) -> Vec<&'static str> {
-        std::iter::from_fn(|| schedule.next()).map(|(_, job)| job).collect()
+        std::iter::from_fn(|| schedule.next(|_| false)).map(|(_, job)| job).collect()
     }
 
     #[test]
@@ -126,6 +129,17 @@ mod tests {
         assert_eq!(begun(&mut schedule), ["b"]);
         schedule.done(2);
         assert_eq!(begun(&mut schedule), ["c", "d"]);
+    }
+
+    #[test]
+    fn a_job_waits_while_another_client_uses_its_node() {
+        let mut schedule = Schedule::default();
+        schedule.add(node(1), Haste::Asked, "a");
+        schedule.add(node(2), Haste::Asked, "b");
+        let one = NodeId::new(1).unwrap();
+        assert_eq!(schedule.next(|node| node == one), Some((1, "b")));
+        assert_eq!(schedule.next(|node| node == one), None);
+        assert_eq!(schedule.next(|_| false), Some((2, "a")));
     }
 
     #[test]

@@ -2,7 +2,9 @@
 //! producer and sub-index FFh, which the library leaves out.
 
 use crate::wire::Answers;
-use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Sizes, Type};
+use canopen::dictionary::{
+    Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Services, Sizes, Type,
+};
 use canopen::{
     Action, Application, Device, Duration, Frame, Instant, Job, Next, NodeId, Soundness, Stored, objects,
 };
@@ -180,7 +182,8 @@ impl Application for App {
 /// The size of the largest dictionary image, in bytes.
 const SIZE: usize = 2048;
 /// Sizes that suffice for every dictionary.
-const ROOM: Sizes = Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned: 48 };
+const ROOM: Sizes =
+    Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned: 48, services: Services::ALL };
 
 /// The library's device with the additions.
 pub(super) struct Whole {

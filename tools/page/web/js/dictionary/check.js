@@ -9,6 +9,8 @@ export function check(entry, typed) {
   if (!isWritable(entry)) return "This object cannot be written.";
   if (/STRING|DOMAIN/.test(entry.type)) return null;
   if (entry.type === "BOOLEAN") return /^(0|1|true|false)$/i.test(typed.trim()) ? null : "0 or 1 is wanted.";
+  // Words, and numbers in a unit that another object selects: only the server knows their number.
+  if (/^[a-z]/i.test(typed.trim()) || /^[0-9A-F]{4}h/.test(entry.unit ?? "")) return null;
   const value = parseNumber(typed);
   if (value == null) return "A number is wanted, as 12, -3.5 or 1Fh.";
   return checkRange(entry, value);
@@ -24,8 +26,7 @@ export function isReadable({ access }) {
 
 function checkRange(entry, value) {
   const { low, high } = limits(entry);
-  // A number with a decimal point is in the unit of the object. Only the server knows the position of the point.
-  if (INTEGER.test(entry.type) && !Number.isInteger(value)) return entry.unit ? null : "A whole number is wanted.";
+  if (INTEGER.test(entry.type) && !Number.isInteger(value)) return "A whole number is wanted.";
   if (low != null && value < low) return `Too low: ${rangeText(entry)} is wanted.`;
   if (high != null && value > high) return `Too high: ${rangeText(entry)} is wanted.`;
   return null;

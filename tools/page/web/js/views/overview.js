@@ -65,8 +65,8 @@ function makeRow(bus, result, id) {
 
 function fillRow({ element, cells }, node) {
   set(element, "data-kind", node.alive ? null : "gone");
-  text(cells.Name, node.name ?? `unknown device ${hex(node.device_type)}`);
-  set(cells.Name, "title", `vendor ${hex(node.vendor)}, product ${hex(node.product)}, revision ${hex(node.revision)}, serial number ${hex(node.serial)}, software ${node.version ?? "-"}, hardware ${node.hardware ?? "-"}`);
+  text(cells.Name, node.name ?? (node.device_type == null ? "not identified yet" : `unknown device ${hex(node.device_type)}`));
+  set(cells.Name, "title", `vendor ${hex(node.vendor)}, product ${hex(node.product)}, revision ${hex(node.revision)}, serial number ${hex(node.serial)}, software ${node.version ?? "-"}, hardware ${node.hardware ?? "-"}${node.note ? `; ${node.note}` : ""}`);
   text(cells.Personality, node.personality ?? "-");
   text(cells.State, stateOf(node));
   set(cells.State, "data-kind", node.alive && node.state === "operational" ? "good" : node.alive ? "warn" : "bad");
@@ -76,7 +76,8 @@ function fillRow({ element, cells }, node) {
   text(cells.Load, `${percent(node.load)}, ${node.frames}/s`);
 }
 
-function stateOf({ alive, state, updating }) {
+function stateOf({ alive, state, updating, other_client }) {
   if (updating) return "updating";
-  return alive ? (state ?? "no heartbeat heard") : "not heard any more";
+  const shown = alive ? (state ?? "no heartbeat heard") : "not heard any more";
+  return other_client ? `${shown}, another client is active` : shown;
 }

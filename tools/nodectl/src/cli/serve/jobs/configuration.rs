@@ -2,7 +2,7 @@
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
-use eds::{Commissioning, Eds};
+use eds::{Commissioning, Eds, Reals};
 use serde_json::{Value as Json, json};
 
 use super::{Context, Job};
@@ -60,7 +60,7 @@ pub(super) fn dcf(node: NodeId, all: bool) -> Job {
         let bit_rate = context.session.options.bit_rate;
         file.commissioning = Some(Commissioning { node_id: node.get(), bit_rate, serial });
         let name = format!("node{}.dcf", node.get());
-        let text = file.to_dcf(&name);
+        let text = file.to_dcf(&name, Reals::Decimal);
         Ok(json!({ "name": name, "text": text }))
     })
 }

@@ -30,6 +30,7 @@ use super::schedule::Lane;
 use super::stimuli;
 use crate::cli::store::Order;
 use crate::cli::{Failure, Options, Output, Session};
+use crate::sdo::Channel;
 use crate::trace::Knowledge;
 use crate::{Catalogue, Network};
 
@@ -60,12 +61,21 @@ pub(super) struct Means {
     pub(super) number: u64,
 }
 
+/// What earlier jobs have learned of the node of a job.
+pub(super) struct Known {
+    pub(super) node: NodeId,
+    pub(super) channel: Channel,
+    pub(super) catalogue: Arc<Catalogue>,
+}
+
 /// Facts that a job reports to the pump, for all pages.
 pub(super) enum Learned {
     /// The node exists.
     Present,
     Identity(Identity, Arc<Catalogue>),
     Catalogue(Arc<Catalogue>),
+    /// The SDO channel for the node.
+    Channel(Channel),
     Survey(Survey, Box<Knowledge>),
     Reading(Multiplexer, Vec<u8>),
 }
@@ -109,6 +119,7 @@ impl Context {
         let is_new = !self.session.knows(node);
         let catalogue = self.session.catalogue(node)?;
         if is_new {
+            self.learned(node, Learned::Channel(self.session.network.channel(node)));
             self.learned(node, Learned::Catalogue(Arc::clone(&catalogue)));
         }
         Ok(catalogue)
@@ -133,7 +144,8 @@ impl Job {
         node: NodeId,
         work: impl FnOnce(&mut Context) -> Result<Json, Failure> + Send + 'static,
     ) -> Job {
-        Job { interest: Interest::Node(node), is_update: false, work: Box::new(work) }
+        let interest = Interest::Node(node, Channel::default_of(node));
+        Job { interest, is_update: false, work: Box::new(work) }
     }
 
     fn of_services(work: impl FnOnce(&mut Context) -> Result<Json, Failure> + Send + 'static) -> Job {
@@ -145,7 +157,7 @@ impl Job {
 pub(super) fn begin(
     job: Job,
     number: u64,
-    known: Option<(NodeId, Arc<Catalogue>)>,
+    known: Option<Known>,
     options: &Options,
     orders: &Sender<pump::Order>,
 ) {
@@ -170,15 +182,20 @@ pub(super) fn begin(
 fn work(
     job: Job,
     number: u64,
-    known: Option<(NodeId, Arc<Catalogue>)>,
+    known: Option<Known>,
     options: &Options,
     orders: &Sender<pump::Order>,
 ) -> Result<Json, Refusal> {
-    let (interest, for_port) = (job.interest, orders.clone());
+    let for_port = orders.clone();
+    let interest = known.as_ref().map_or(job.interest, |known| Interest::Node(known.node, known.channel));
     let network = Network::open(move || Ok(port::open(&for_port, interest)));
     let network = network.map_err(|error| Refusal::new(error.to_string()))?;
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
-    if let Some((node, catalogue)) = known {
+    session.has_many_nodes = true;
+    if let Some(Known { node, channel, catalogue }) = known {
+        session
+            .network
+            .set_channel(node, Some(channel).filter(|channel| *channel != Channel::default_of(node)));
         session.know(node, catalogue);
     }
     let mut context = Context { session, orders: orders.clone(), number };

@@ -168,7 +168,8 @@ fn encode(
     let data_type = catalogue
         .data_type(at)
         .ok_or_else(|| refuse("no data sheet tells the type of this object".to_owned()))?;
-    let value = quantity.parse(text, data_type).map_err(|error| refuse(error.to_string()))?;
+    let value = catalogue.word(at, text).map_or_else(|| quantity.parse(text, data_type), Ok);
+    let value = value.map_err(|error| refuse(error.to_string()))?;
     if !catalogue.allows(at, node, &value) {
         let range = catalogue.range(at, node).unwrap_or_default();
         return Err(refuse(format!("{value} is out of range; it takes {range}")));

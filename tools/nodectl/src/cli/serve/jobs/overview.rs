@@ -9,6 +9,7 @@ use super::{Context, Job, Learned};
 use crate::cli::Failure;
 use crate::cli::nmt::Command;
 use crate::cli::serve::nodes::Identity;
+use crate::cli::sheets::{fits, misfit};
 use crate::cli::store::{Group, Order, sign};
 use crate::object::at;
 use crate::{Catalogue, heartbeat, nmt};
@@ -49,14 +50,12 @@ fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Arc<Catalo
     let (name, hardware, version) = (text(0x1008)?, text(0x1009)?, text(0x100A)?);
     let [vendor, product, revision, serial] = words;
     // The device may have been exchanged, so only the present answers count.
-    let file = session.options.eds.is_some();
-    let known = if file { Some(session.catalogue(node)?) } else { None };
-    let known = known.or_else(|| {
-        vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)).map(Arc::new)
-    });
+    let catalogue = Arc::new(session.catalogue_of(node, (vendor, product))?);
     let personality =
         vendor.zip(product).and_then(|(vendor, product)| Catalogue::device_name(vendor, product));
-    let catalogue = known.unwrap_or_else(|| Arc::new(Catalogue::unknown()));
+    let file = session.sheets()?.file();
+    let note =
+        file.filter(|sheet| !fits(sheet, (vendor, product))).map(|sheet| misfit(sheet, (vendor, product)));
     let identity = Identity {
         name,
         personality,
@@ -68,6 +67,7 @@ fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Arc<Catalo
         serial,
         version,
         hardware,
+        note,
     };
     Ok((identity, catalogue))
 }

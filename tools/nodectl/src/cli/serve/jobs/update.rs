@@ -31,20 +31,20 @@ pub(super) fn inspect(node: NodeId, name: String, bytes: Vec<u8>, file: u64) -> 
         let checks = checks(&image, &device, &name);
         let allowed = checks.iter().all(|check| check["ok"] != false || check["name"] == "version");
         let info = image.ok().and_then(|image| image.info);
-        let image = info.map(|ImageInfo { product, version, identification }| {
+        let image = info.map(|ImageInfo { board, version, identification }| {
             json!({
-                "product": product, "version": version.to_string(), "bytes": length, "identification": identification
+                "board": board, "version": version.to_string(), "bytes": length, "identification": identification
             })
         });
-        let Device { product, version, identification } = device;
-        let device = json!({ "product": product, "version": version, "identification": identification });
+        let Device { board, version, identification } = device;
+        let device = json!({ "board": board, "version": version, "identification": identification });
         Ok(json!({ "file": file, "checks": checks, "allowed": allowed, "image": image, "device": device }))
     })
 }
 
 /// The identity of a node, as far as an update needs it.
 struct Device {
-    product: Option<u32>,
+    board: Option<u32>,
     version: Option<String>,
     identification: Option<u32>,
 }
@@ -52,11 +52,11 @@ struct Device {
 fn device(context: &mut Context, node: NodeId) -> Result<Device, Failure> {
     context.session.begin();
     let options = context.session.options.sdo();
-    let product = context.session.word(node, at(0x1018, 2))?;
+    let board = context.session.word(node, at(0x2004, 1))?;
     let version = context.session.text(node, 0x100A)?;
     let identification = Program::new(&mut context.session.network, node, options).identification();
     let identification = identification.map_err(|error| context.session.named(error))?;
-    Ok(Device { product, version, identification })
+    Ok(Device { board, version, identification })
 }
 
 fn checks(image: &Result<Image, String>, device: &Device, name: &str) -> Vec<Json> {
@@ -66,14 +66,14 @@ fn checks(image: &Result<Image, String>, device: &Device, name: &str) -> Vec<Jso
         Ok(_) => return Vec::new(),
         Err(reason) => return vec![check("file", false, format!("{name}: {reason}"))],
     };
-    let ImageInfo { product, version: new, .. } = *info;
-    let of_device = match device.product {
-        Some(device) => format!("the image is for product {product:08X}h, the node is product {device:08X}h"),
-        None => "the node does not tell its product code".to_owned(),
+    let ImageInfo { board, version: new, .. } = *info;
+    let of_device = match device.board {
+        Some(device) => format!("the image is for board {board:08X}h, the node has board {device:08X}h"),
+        None => "the node has no board code (2004h); its bootloader checks the image".to_owned(),
     };
     vec![
         check("file", true, format!("{name}: whole, its checksum is right; the node checks the signature")),
-        check("product", device.product == Some(product), of_device),
+        check("board", device.board.is_none_or(|device| device == board), of_device),
         version_check(new, device.version.as_deref(), check),
     ]
 }
@@ -166,17 +166,14 @@ mod tests {
     }
 
     #[test]
-    fn an_older_version_is_a_warning_and_another_product_a_refusal() {
+    fn an_older_version_is_a_warning_and_another_board_a_refusal() {
         let image = |major| {
             let info =
-                ImageInfo { product: 1, version: Version { major, minor: 0, patch: 0 }, identification: 7 };
+                ImageInfo { board: 1, version: Version { major, minor: 0, patch: 0 }, identification: 7 };
             Ok(Image { bytes: Vec::new(), info: Some(info) })
         };
-        let device = |product| Device {
-            product: Some(product),
-            version: Some("2.0.0".to_owned()),
-            identification: None,
-        };
+        let device =
+            |board| Device { board: Some(board), version: Some("2.0.0".to_owned()), identification: None };
         let ok = |checks: Vec<Json>| checks.iter().map(|check| check["ok"] == true).collect::<Vec<_>>();
         assert_eq!(ok(checks(&image(3), &device(1), "a")), [true, true, true]);
         assert_eq!(ok(checks(&image(1), &device(1), "a")), [true, true, false]);

@@ -3,7 +3,7 @@
 use canopen::{Duration, Instant, NodeId};
 use serde_json::json;
 
-use super::{ASK_AGAIN, Pump, SETTLED};
+use super::{ACTIVE, AFTER_BOOT, ALONE, ASK_AGAIN, CALM, Pump, SETTLED};
 use crate::bus::clock;
 use crate::cli::serve::jobs;
 use crate::cli::serve::nodes::Node;
@@ -35,32 +35,64 @@ impl Pump {
 
     pub(super) fn look_at_nodes(&mut self) {
         let t = self.now();
-        let settled: Vec<NodeId> =
-            self.remapped.iter().filter(|(_, since)| t - since > SETTLED).map(|(node, _)| *node).collect();
+        let is_settled = |(node, since): &&(NodeId, f64)| t - since > SETTLED && self.is_calm(*node, t);
+        let settled: Vec<NodeId> = self.remapped.iter().filter(is_settled).map(|(node, _)| *node).collect();
         self.remapped.retain(|(node, _)| !settled.contains(node));
         for node in settled {
-            if self.live.survey(node).is_some() {
-                self.live.forget(node);
+            let had_one = self.live.survey(node).is_some();
+            self.live.forget(node);
+            if had_one && self.pages.count() > 0 {
                 self.survey(node);
             }
         }
+        self.show_other_clients();
         self.identify(t);
         let changed = self.nodes.changed().map(|rows| rows.to_string());
         self.pages.tell_nodes(&self.setup.hub, changed.as_deref(), || self.nodes.all().to_string());
     }
 
-    /// Requests the identities of nodes that were heard and have not been asked yet.
+    /// Whether no master configures a node now: the node has not just booted, and no other client sends requests.
+    fn is_calm(&self, node: NodeId, t: f64) -> bool {
+        let since_request = self.others.since_request(node, clock::now());
+        since_request.is_none_or(|time| time > CALM)
+            && self.nodes.get(node).is_none_or(|entry| entry.since_boot(t) > AFTER_BOOT)
+    }
+
+    /// Marks the nodes that another client talks to.
+    fn show_other_clients(&mut self) {
+        let now = clock::now();
+        let is_active = |node| self.others.since_request(node, now).is_some_and(|time| time < ACTIVE);
+        let changed: Vec<(NodeId, bool)> = self
+            .nodes
+            .iter()
+            .map(|(node, entry)| (node, entry.other_client, is_active(node)))
+            .filter(|(_, before, after)| before != after)
+            .map(|(node, _, after)| (node, after))
+            .collect();
+        for (node, is_active) in changed {
+            self.nodes.change(node).other_client = is_active;
+        }
+    }
+
+    /// Requests the identities of the nodes that are still unknown, while a page is open. Nothing is sent for pages that
+    /// are not there, nor to a node that boots or has another client: the request of that client might get the answer.
     pub(super) fn identify(&mut self, t: f64) {
-        if self.setup.silent || self.bus.is_err() {
+        if self.setup.silent || self.bus.is_err() || self.pages.count() == 0 {
             return;
         }
-        let is_to_be_asked = |entry: &Node| {
+        let now = clock::now();
+        let is_to_be_asked = |node: NodeId, entry: &Node| {
             let is_deaf = entry.state() == Some(canopen::nmt::State::Stopped) || entry.updating;
-            let is_new = entry.asked.is_none_or(|asked| entry.identity.is_none() && t - asked > ASK_AGAIN);
-            entry.is_alive() && is_new && !is_deaf
+            let is_new = entry.asked.is_none_or(|asked| entry.is_unknown() && t - asked > ASK_AGAIN);
+            let is_alone = self.others.since_request(node, now).is_none_or(|time| time > ALONE);
+            entry.is_alive() && is_new && !is_deaf && is_alone && entry.since_boot(t) > AFTER_BOOT
         };
-        let unknown: Vec<NodeId> =
-            self.nodes.iter().filter(|(_, entry)| is_to_be_asked(entry)).map(|(node, _)| node).collect();
+        let unknown: Vec<NodeId> = self
+            .nodes
+            .iter()
+            .filter(|(node, entry)| is_to_be_asked(*node, entry))
+            .map(|(node, _)| node)
+            .collect();
         for node in unknown {
             self.nodes.change(node).asked = Some(t);
             self.enqueue(None, Lane::Node(node), Haste::Background, Some(node), jobs::identify(node));
@@ -71,7 +103,7 @@ impl Pump {
     /// yet.
     pub(super) fn poll(&mut self) {
         for node in self.live.wanted_nodes() {
-            let is_free = !self.schedule.has(Lane::Node(node));
+            let is_free = !self.schedule.has(Lane::Node(node)) && self.is_calm(node, self.now());
             if !is_free
                 || self.bus.is_err()
                 || !self.nodes.get(node).is_some_and(super::super::nodes::Node::is_alive)

@@ -1,10 +1,15 @@
 //! Receiving and sending of frames, and the loss of the bus.
 
+use std::sync::Arc;
+
 use canopen::{Frame, NodeId};
 use serde_json::json;
 
 use super::{AT_ONCE, LISTEN, Pump, REOPEN};
+use crate::Catalogue;
 use crate::bus::{BusError, Received, clock};
+use crate::cli::serve::jobs::Learned;
+use crate::trace::Transferred;
 
 impl Pump {
     pub(super) fn take_frames(&mut self) {
@@ -31,6 +36,9 @@ impl Pump {
         }
         self.live.on_frame(frame, t);
         self.look_at_writes(frame, t);
+        if let Some((node, ended)) = self.others.on_frame(frame, clock::now()) {
+            self.overhear(node, &ended);
+        }
         if self.pages.have_trace() {
             self.tracer.on_frame(frame, received.at, t, false);
         }
@@ -41,6 +49,20 @@ impl Pump {
         let node = u8::try_from(frame.id() & 0x7F).ok().and_then(NodeId::new);
         if let (0x701..=0x77F, Some(node), [0]) = (frame.id(), node, frame.data()) {
             self.remapped.push((node, t));
+            // An additional SDO server may be off again.
+            self.others.set_channel(node, None);
+        }
+    }
+
+    /// Learns the identity of a node from the transfers of other clients.
+    fn overhear(&mut self, node: NodeId, ended: &Transferred) {
+        let Some(bytes) = ended.read() else { return };
+        let mut identity = self.nodes.get(node).and_then(|node| node.identity.clone()).unwrap_or_default();
+        if identity.hear(ended.at, bytes) {
+            let known = self.nodes.get(node).and_then(|node| node.catalogue.clone());
+            let catalogue = identity.catalogue().map(Arc::new).or(known);
+            let catalogue = catalogue.unwrap_or_else(|| Arc::new(Catalogue::unknown()));
+            self.learn(node, Learned::Identity(identity, catalogue));
         }
     }
 
@@ -88,7 +110,6 @@ impl Pump {
         if self.bus.is_ok() {
             self.time.restart();
             self.due.status = now;
-            self.scan();
         }
     }
 }

@@ -15,17 +15,18 @@ use page::{FromPage, Hub, PageId};
 use serde_json::Value as Json;
 
 use super::bus_time::BusTime;
-use super::jobs::{self, Job, Learned};
+use super::jobs::{Job, Learned};
 use super::live::Live;
 use super::nodes::Nodes;
 use super::pages::Pages;
 use super::port::Outlet;
-use super::schedule::{Haste, Lane, Schedule};
+use super::schedule::Schedule;
 use super::status::{Count, Rate};
 use super::tracer::Tracer;
 use crate::Catalogue;
 use crate::bus::{Bus, BusError, clock};
 use crate::cli::Options;
+use crate::other_clients::OtherClients;
 
 /// The number of frames that are taken before the next look for orders.
 const AT_ONCE: usize = 512;
@@ -39,6 +40,14 @@ const REOPEN: Duration = Duration::from_millis(1000);
 const SETTLED: f64 = 0.3;
 /// The time after which a node that has not told its identity is asked again, in seconds.
 const ASK_AGAIN: f64 = 10.0;
+/// A node is asked for its identity this long after its boot-up, in seconds: a master configures it first.
+const AFTER_BOOT: f64 = 2.0;
+/// A node is asked for its identity when no other client has sent it a request for this time.
+const ALONE: Duration = Duration::from_millis(10_000);
+/// A node is surveyed and polled for the pages when no other client has sent it a request for this time.
+const CALM: Duration = Duration::from_millis(1000);
+/// Another client of a node is shown as active for this time after its last request.
+const ACTIVE: Duration = Duration::from_millis(5000);
 
 /// The version of the protocol with the pages.
 const PROTOCOL: u32 = 1;
@@ -124,6 +133,7 @@ pub(super) struct Pump {
     live: Live,
     tracer: Tracer,
     pages: Pages,
+    others: OtherClients,
     schedule: Schedule<Waiting>,
     running: Vec<Running>,
     count: Count,
@@ -160,6 +170,7 @@ impl Pump {
             live: Live::default(),
             tracer: Tracer::default(),
             pages: Pages::default(),
+            others: OtherClients::default(),
             schedule: Schedule::default(),
             running: Vec::new(),
             count: Count::default(),
@@ -176,9 +187,6 @@ impl Pump {
 
     /// Runs until the process ends.
     pub(super) fn run(mut self) {
-        if self.bus.is_ok() {
-            self.scan();
-        }
         loop {
             self.take_frames();
             if self.take_orders().is_err() {
@@ -186,13 +194,6 @@ impl Pump {
             }
             self.begin_jobs();
             self.tick();
-        }
-    }
-
-    /// Searches for nodes on the bus.
-    fn scan(&mut self) {
-        if !self.setup.silent {
-            self.enqueue(None, Lane::Everything, Haste::Asked, None, jobs::scan());
         }
     }
 

@@ -6,9 +6,11 @@ use canopen::NodeId;
 use serde_json::{Value as Json, json};
 
 use super::{Asker, Pump, Refusal, Running, Waiting};
-use crate::cli::serve::jobs::{self, Job, Learned};
+use crate::bus::clock;
+use crate::cli::serve::jobs::{self, Job, Known, Learned};
 use crate::cli::serve::live::Key;
 use crate::cli::serve::schedule::{Haste, Lane};
+use crate::sdo::Channel;
 
 impl Pump {
     pub(super) fn enqueue(
@@ -23,10 +25,16 @@ impl Pump {
     }
 
     pub(super) fn begin_jobs(&mut self) {
-        while let Some((number, Waiting { asker, node, job })) = self.schedule.next() {
+        let now = clock::now();
+        let others = &self.others;
+        while let Some((number, waiting)) = self.schedule.next(|node| others.is_busy(node, now)) {
+            let Waiting { asker, node, job } = waiting;
             self.running.push(Running { number, asker, node, is_update: job.is_update });
-            let known = node.and_then(|node| self.nodes.get(node)?.catalogue.clone());
-            jobs::begin(job, number, node.zip(known), &self.setup.options, &self.orders);
+            let known = node.and_then(|node| {
+                let catalogue = self.nodes.get(node)?.catalogue.clone()?;
+                Some(Known { node, channel: others.channel(node), catalogue })
+            });
+            jobs::begin(job, number, known, &self.setup.options, &self.orders);
         }
     }
 
@@ -85,6 +93,11 @@ impl Pump {
                 self.tracer.know(node, &catalogue);
                 let entry = self.nodes.change(node);
                 (entry.identity, entry.catalogue) = (Some(identity), Some(catalogue));
+            }
+            Learned::Channel(channel) => {
+                let additional = Some(channel).filter(|channel| *channel != Channel::default_of(node));
+                self.others.set_channel(node, additional);
+                self.outlets.iter_mut().for_each(|outlet| outlet.choose(node, channel));
             }
             Learned::Catalogue(catalogue) => {
                 self.tracer.know(node, &catalogue);

@@ -7,6 +7,7 @@ export const LIFT = {
   0x2303: "What is wrong with a position unit, a bit each: above or below its limits, no reading that can be, not referenced.",
   0x2304: "Where the readings of the sensor are, believed or not.",
   0x2305: "Which units of the lift this node is: bit 0 car position, 1 load, 2 input panel, 3 output panel.",
+  0x2307: "The TPDOs that a client has switched off by bit 31 of their COB-ID: bit 0 for 1901h, bits 1 to 4 for 1906h, 1907h, 1980h and 1981h. They stay off when their unit is chosen again.",
   0x2306: "How often a preset has said where a sensor is.",
   0x2310: "Kind and strength of the filter of the load.",
   0x2311: "Two points of the load: a pressure in Pa and the load in kg that it stands for, each.",

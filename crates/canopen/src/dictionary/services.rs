@@ -1,0 +1,70 @@
+//! The services that the rows of a table ask for.
+
+use super::compile::can_be_multiplexed;
+use super::{Object, Rule};
+
+/// The services of a [`Device`](crate::Device), as far as they depend on its rows. The code of a service that the rows
+/// lack is not linked.
+///
+/// TPDOs, RPDOs, the heartbeat consumer and the multiplexed TPDO are not in the set: the numbers in
+/// [`Sizes`](super::Sizes) decide on them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Services(u16);
+
+impl Services {
+    /// SYNC consumer: the rows have 1005h. Without it, a PDO has no synchronous transmission type.
+    pub const SYNC: Services = Services(1);
+    /// EMCY producer: the rows have 1014h. Without it, a fault sets the error register (1001h) and has the effect of
+    /// 1029h, but no EMCY is sent and no error is listed in 1003h.
+    pub const EMCY: Services = Services(1 << 1);
+    /// Storing and restoring by 1010h, 1011h, a [`setting`](Object::setting) or the command for the calibration.
+    pub const STORE: Services = Services(1 << 2);
+    /// Multiplexed RPDOs: the rows have an RPDO that can be [`multiplexed`](crate::objects::multiplexed).
+    pub const MULTIPLEXED_RPDO: Services = Services(1 << 3);
+
+    /// None of these services.
+    pub const NONE: Services = Services(0);
+    /// All services, for a device whose rows are not known when it is compiled.
+    pub const ALL: Services = Services(0xF);
+
+    /// The services that these rows ask for.
+    #[must_use]
+    #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+    pub const fn of(rows: &[Object]) -> Services {
+        let (mut services, mut i) = (Services::NONE, 0);
+        while i < rows.len() {
+            let row = &rows[i];
+            services = services.with(match row.rule {
+                Rule::SyncCobId => Services::SYNC,
+                Rule::EmcyCobId => Services::EMCY,
+                Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting => Services::STORE,
+                Rule::PdoCount if row.index < 0x1800 && can_be_multiplexed(row) => Services::MULTIPLEXED_RPDO,
+                _ => Services::NONE,
+            });
+            i += 1;
+        }
+        services
+    }
+
+    /// The services of both sets.
+    #[must_use]
+    pub const fn with(self, other: Services) -> Services {
+        Services(self.0 | other.0)
+    }
+
+    /// Whether all services of `other` are in the set.
+    #[must_use]
+    pub const fn contains(self, other: Services) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The set as a number, the last parameter of [`Device`](crate::Device).
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    pub(crate) const fn from_bits(bits: u16) -> Services {
+        Services(bits)
+    }
+}

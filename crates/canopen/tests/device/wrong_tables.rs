@@ -1,0 +1,154 @@
+//! A wrong table does not compile. `check` is a constant function: here it runs with the test, and its message is the
+//! compile error.
+
+use canopen::dictionary::{Access, DefaultValue, Mapping, Object, Type, check};
+use canopen::objects;
+
+const INPUT: Object =
+    Object::new(0x6000, 0, "Input", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
+const OUTPUT: Object =
+    Object::new(0x6200, 0, "Output", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo);
+
+/// The compile error of a table of these rows; `None` for a table that compiles.
+fn compile_error(parts: &[&[Object]]) -> Option<String> {
+    let mut rows = parts.concat();
+    rows.sort_by_key(Object::key);
+    std::panic::catch_unwind(move || check(&rows))
+        .err()
+        .map(|payload| payload.downcast_ref::<String>().cloned().expect("a message with index and sub-index"))
+}
+
+#[track_caller]
+fn assert_error(parts: &[&[Object]], message: &str) {
+    assert_eq!(compile_error(parts).as_deref(), Some(message));
+}
+
+#[test]
+fn a_pdo_maps_only_objects_of_the_table() {
+    assert_eq!(compile_error(&[&objects::tpdo(1, &[INPUT]), &[INPUT]]), None);
+    assert_error(&[&objects::tpdo(1, &[INPUT])], "1A00h:1: the mapped object is not in the table");
+    assert_error(&[&objects::rpdo(300, &[OUTPUT])], "172Bh:1: the mapped object is not in the table");
+}
+
+#[test]
+fn a_mapped_object_has_the_length_of_its_row() {
+    let wide = Object { kind: Type::Unsigned16, ..INPUT };
+    assert_error(&[&objects::tpdo(2, &[INPUT]), &[wide]], "1A01h:1: the mapped object has another length");
+    let dummy = [objects::pdo::slot(0x1600, 1, 0x0005_0010)];
+    let mut rows = objects::rpdo(1, &[OUTPUT]);
+    rows[5] = dummy[0];
+    assert_error(&[&rows, &[OUTPUT]], "1600h:1: the dummy object has another length");
+}
+
+#[test]
+fn a_mapped_object_is_mappable_in_the_direction_of_the_pdo() {
+    let message = "1A00h:1: the mapped object cannot be mapped in this direction";
+    let unmapped = INPUT.mappable(Mapping::No);
+    assert_error(&[&objects::tpdo(1, &[INPUT]), &[unmapped]], message);
+    let message = "1600h:1: the mapped object cannot be mapped in this direction";
+    assert_error(&[&objects::rpdo(1, &[OUTPUT]), &[OUTPUT.mappable(Mapping::Tpdo)]], message);
+}
+
+#[test]
+fn an_unused_mapping_entry_is_checked_too() {
+    let mut rows = objects::tpdo(1, &[INPUT]);
+    rows[14] = rows[14].value(0x6001_0008);
+    assert_error(&[&rows, &[INPUT]], "1A00h:8: the mapped object is not in the table");
+}
+
+#[test]
+fn a_reserved_transmission_type_does_not_compile() {
+    for kind in [241, 251] {
+        let rows = objects::with(objects::tpdo(1, &[INPUT]), 2, kind);
+        assert_error(&[&rows, &[INPUT]], "1800h:2: the transmission types 241 to 251 are reserved");
+    }
+    for kind in [0, 1, 240, 252, 253, 254, 255] {
+        let rows = objects::with(objects::tpdo(1, &[INPUT]), 2, kind);
+        assert_eq!(compile_error(&[&rows, &objects::sync_consumer(), &[INPUT]]), None);
+    }
+    let rows = objects::with(objects::tpdo(1, &[INPUT]), 2, 1);
+    let message = "1800h:2: the transmission type needs SYNC, and the table has no 1005h";
+    assert_error(&[&rows, &[INPUT]], message);
+    let rows = objects::with(objects::rpdo(1, &[OUTPUT]), 2, 253);
+    assert_error(&[&rows, &[OUTPUT]], "1400h:2: an RPDO has no transmission type 252 or 253");
+}
+
+#[test]
+fn a_pdo_that_is_valid_can_be_sent() {
+    let mut rows = objects::tpdo(1, &[]);
+    rows[1] = rows[1].default(DefaultValue::NodeId(0x180));
+    assert_error(&[&rows], "1A00h:0: the PDO is valid, but maps no object");
+    rows[1] = rows[1].default(DefaultValue::Integer(0x601));
+    assert_error(&[&rows], "1800h:1: the CAN-ID is reserved for another service");
+    rows[1] = rows[1].default(DefaultValue::Integer(0x800));
+    assert_error(&[&rows], "1800h:1: the COB-ID has a CAN-ID of more than 11 bits");
+    let mut rows = objects::with(objects::tpdo(1, &[INPUT]), 2, 253);
+    rows[1] = rows[1].default(DefaultValue::NodeId(0x4000_0180));
+    assert_error(&[&rows, &[INPUT]], "1800h:2: the transmission type needs remote frames");
+}
+
+#[test]
+fn a_pdo_has_all_its_rows() {
+    let rows = objects::tpdo(1, &[INPUT]);
+    let all = |missing: usize| [&rows[..missing], &rows[missing + 1..], &[INPUT]].concat();
+    assert_error(&[&all(1)], "1800h:1: the PDO has no COB-ID");
+    assert_error(&[&all(2)], "1800h:2: the PDO has no transmission type");
+    assert_error(&[&all(7)], "1A00h:1: the PDO maps more objects than it has entries");
+    assert_error(&[&rows[..6]], "1A00h:0: the PDO has no mapping parameter");
+    assert_error(&[&rows[6..], &[INPUT]], "1A00h:0: the mapping parameter has no communication parameter");
+}
+
+#[test]
+fn mapped_objects_are_not_longer_than_a_pdo() {
+    let long = Object { index: 0x6001, kind: Type::Unsigned64, ..INPUT };
+    let mut rows = objects::tpdo(1, &[INPUT]);
+    rows[6] = rows[6].value(2);
+    rows[8] = rows[8].value(0x6001_0040);
+    assert_error(&[&rows, &[INPUT, long]], "1A00h:0: the mapped objects have more than eight bytes");
+}
+
+#[test]
+fn an_entry_of_cia_301_keeps_its_service() {
+    let message =
+        "1017h:0: the entry would lose its service: no handled(), setting() and the like for this index";
+    assert_error(&[&[objects::heartbeat_producer(1000).handled()]], message);
+    let setting = Object::new(0x1019, 0, "", Type::Unsigned8, Access::ReadWrite).setting();
+    let message =
+        "1019h:0: the entry would lose its service: no handled(), setting() and the like for this index";
+    assert_error(&[&[setting]], message);
+    // A rule cannot move to another index either.
+    let moved = Object { index: 0x2000, ..objects::heartbeat_producer(0) };
+    let message =
+        "2000h:0: the entry would lose its service: no handled(), setting() and the like for this index";
+    assert_error(&[&[moved]], message);
+    // The application of a bootloader controls the program.
+    let [highest, control] = objects::program_control();
+    assert_eq!(compile_error(&[&[highest, control.handled()]]), None);
+}
+
+#[test]
+fn an_error_names_the_row() {
+    let row = |sub| Object::new(0x20AF, sub, "", Type::Unsigned8, Access::ReadWrite);
+    assert_error(&[&[row(0).value(256)]], "20AFh:0: the default is out of range");
+    assert_error(&[&[row(0), row(130).limits(5, 4)]], "20AFh:130: the lower limit is above the upper one");
+    assert_error(&[&[row(0), row(15).limits(0, 256)]], "20AFh:15: the limits are wider than the type");
+    assert_error(&[&[row(1)]], "20AFh:1: the object has no sub-index 0");
+    assert_error(&[&[row(0), row(0)]], "20AFh:0: the row is there twice");
+    assert_error(&[&[row(0).real(1.0)]], "20AFh:0: the default is of another type than the entry");
+    let timer = Object::new(0x20AF, 0, "", Type::Unsigned16, Access::ReadWrite).event_timer_of(0);
+    assert_error(&[&[timer]], "20AFh:0: the TPDO has no event timer (sub-index 5)");
+}
+
+#[test]
+fn a_missing_field_is_named() {
+    let message = |index, sub| {
+        let error = std::panic::catch_unwind(move || crate::bench::DICTIONARY.field(index, sub)).unwrap_err();
+        error.downcast_ref::<String>().cloned()
+    };
+    assert_eq!(message(0x2FFF, 1).as_deref(), Some("2FFFh:1: no such object in the dictionary"));
+    assert_eq!(message(0x6000, 9).as_deref(), Some("6000h:9: no such sub-index in the dictionary"));
+    assert_eq!(message(0xFFFF, 0).as_deref(), Some("FFFFh:0: no such object in the dictionary"));
+    let error = std::panic::catch_unwind(|| objects::with(objects::rpdo(1, &[]), 3, 1)).unwrap_err();
+    let message = error.downcast_ref::<String>().map(String::as_str);
+    assert_eq!(message, Some("1400h:3: the object has no such row"));
+}

@@ -1,0 +1,147 @@
+//! Devices whose rows lack a service: what remains works, and the service is refused or ignored.
+
+use canopen::dictionary::{Access, Dictionary, Mapping, Object, Services, Sizes, Type};
+use canopen::nmt::State;
+use canopen::{Application, Condition, Device, ErrorClass, Frame, Instant, NodeId, objects};
+
+use crate::bench::{ID, Nothing, Sent, download};
+
+const INPUT: Object =
+    Object::new(0x6000, 0, "Input", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
+
+const ROWS: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register(), objects::heartbeat_producer(0)],
+    objects::error_field::<3>(),
+    objects::error_behaviour(2),
+    objects::tpdo(1, &[INPUT]),
+    [INPUT],
+);
+static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+
+/// The longest values in a multiplexed PDO.
+const WIDE_INPUT: Object =
+    Object::new(0x6001, 0, "", Type::Unsigned32, Access::ReadOnly).mappable(Mapping::Tpdo).value(0x0403_0201);
+const WIDE_OUTPUT: Object =
+    Object::new(0x6200, 0, "", Type::Unsigned32, Access::ReadWrite).mappable(Mapping::Rpdo);
+
+const MULTIPLEXED_ROWS: &[Object] = canopen::rows!(
+    objects::sync_consumer(),
+    objects::emergency(),
+    objects::store_parameters(),
+    objects::multiplexed(objects::tpdo(1, &[INPUT])),
+    objects::multiplexed(objects::rpdo(1, &[])),
+    [INPUT, WIDE_INPUT, WIDE_OUTPUT],
+);
+static MULTIPLEXED: Dictionary = canopen::dictionary!(MULTIPLEXED_ROWS);
+
+/// One fault, of the class of device errors.
+struct Faulty;
+
+impl Application for Faulty {
+    const CONDITIONS: &'static [Condition] = &[Condition::new(0x5000).of_class(ErrorClass::DEVICE)];
+}
+
+type Lean<A> = canopen::device!(A, ROWS);
+
+fn operational<A: Application>(application: A) -> (Lean<A>, Sent) {
+    let (mut device, mut sent) = (Device::new(&DICTIONARY, NodeId::new(ID), application), Sent::default());
+    let _ = device.start(Instant(0), &mut sent);
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(1), &mut sent);
+    assert_eq!(device.state(), State::Operational);
+    sent.0.clear();
+    (device, sent)
+}
+
+#[test]
+fn the_rows_decide_on_the_services() {
+    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::NONE, 0));
+    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (Services::ALL, 2));
+}
+
+#[test]
+fn a_pdo_is_multiplexed_only_if_its_rows_allow_it() {
+    let (mut device, _) = operational(Nothing);
+    let mut off = |index, value: &[u8]| download(&mut device, (index, 0), value, Instant(2));
+    assert_eq!(off(0x1A00, &[0xFF]), Err(0x0609_0031), "value too high");
+    assert_eq!(off(0x1A00, &[0xFE]), Err(0x0609_0031));
+    assert_eq!(off(0x1A00, &[9]), Err(0x0609_0031));
+
+    type Node = canopen::device!(Nothing, MULTIPLEXED_ROWS);
+    let (mut device, mut sent): (Node, _) =
+        (Device::new(&MULTIPLEXED, NodeId::new(ID), Nothing), Sent::default());
+    let _ = device.start(Instant(0), &mut sent);
+    download(&mut device, (0x1800, 1), &0x8000_0185_u32.to_le_bytes(), Instant(1)).unwrap();
+    download(&mut device, (0x1A00, 0), &[0xFF], Instant(2)).unwrap();
+    download(&mut device, (0x1600, 0), &[0xFE], Instant(3)).unwrap();
+}
+
+#[test]
+fn a_multiplexed_pdo_carries_a_value_of_four_bytes() {
+    type Node = canopen::device!(Nothing, MULTIPLEXED_ROWS);
+    let (mut device, mut sent): (Node, _) =
+        (Device::new(&MULTIPLEXED, NodeId::new(ID), Nothing), Sent::default());
+    let _ = device.start(Instant(0), &mut sent);
+    for (index, id) in [(0x1800, 0x185_u32), (0x1400, 0x301)] {
+        download(&mut device, (index, 1), &(0x8000_0000 | id).to_le_bytes(), Instant(1)).unwrap();
+        download(&mut device, (index + 0x200, 0), &[0xFF], Instant(1)).unwrap();
+        download(&mut device, (index, 1), &id.to_le_bytes(), Instant(1)).unwrap();
+    }
+    sent.0.clear();
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(2), &mut sent);
+    let _ = device.poll(Instant(3), &mut sent);
+    assert!(sent.0.iter().any(|frame| frame.data() == [0x80, 0x01, 0x60, 0, 1, 2, 3, 4]), "{:?}", sent.0);
+    let write = Frame::new(0x301, &[0x80 | ID, 0x00, 0x62, 0, 5, 6, 7, 8]).unwrap();
+    let _ = device.on_frame(&write, Instant(4), &mut sent);
+    assert_eq!(MULTIPLEXED.field(0x6200, 0).u32(device.image()), 0x0807_0605);
+}
+
+#[test]
+fn without_1005h_synchronous_types_are_refused_and_sync_is_ignored() {
+    let (mut device, mut sent) = operational(Nothing);
+    let mut write = |kind: u8| download(&mut device, (0x1800, 2), &[kind], Instant(2));
+    for kind in [0, 1, 240, 252] {
+        assert_eq!(write(kind), Err(0x0609_0030), "invalid value: type {kind}");
+    }
+    for kind in [253, 254, 255] {
+        assert_eq!(write(kind), Ok(()), "type {kind}");
+    }
+    // The TPDO is sent once with its new type, and not with the SYNC.
+    let _ = device.poll(Instant(2), &mut sent);
+    sent.0.clear();
+    let _ = device.on_frame(&Frame::new(0x80, &[]).unwrap(), Instant(3), &mut sent);
+    assert_eq!(sent.0, []);
+    assert!(device.process_ids().all(|id| id.get() != 0x80));
+    let _ = device.publish(Instant(4), &mut sent, |_, image| image.fill(1));
+    assert_eq!(sent.0.len(), 1, "the change sends TPDO 1");
+}
+
+#[test]
+fn without_1014h_a_fault_sets_the_error_register_and_1029h_stops_the_node() {
+    let (mut device, mut sent) = operational(Faulty);
+    let register = DICTIONARY.field(0x1001, 0);
+    let _ = device.set_condition(0, true, Instant(2));
+    assert_eq!(register.u8(device.image()) & 1, 1);
+    let next = device.poll(Instant(3), &mut sent);
+    assert_eq!((device.state(), sent.0.as_slice()), (State::Stopped, [].as_slice()));
+    // The change of the state has made the process data due: once more.
+    assert!(next.services > Instant(3));
+    assert_eq!(device.poll(Instant(3), &mut sent).due(), Instant::NEVER);
+    let _ = device.set_condition(0, false, Instant(4));
+    assert_eq!(register.u8(device.image()), 0);
+    // The fault is still active after a reset, and its class counts again.
+    let _ = device.set_condition(0, true, Instant(5));
+    let _ = device.on_frame(&Frame::new(0, &[0x82, ID]).unwrap(), Instant(6), &mut sent);
+    let _ = device.start(Instant(7), &mut sent);
+    assert_eq!((register.u8(device.image()) & 1, device.state()), (1, State::Stopped));
+}
+
+#[test]
+fn an_sdo_request_does_not_delay_process_data_that_is_due() {
+    let (mut device, mut sent) = operational(Nothing);
+    download(&mut device, (0x1800, 5), &10_u16.to_le_bytes(), Instant(2)).unwrap();
+    let _ = device.poll(Instant(2), &mut sent);
+    sent.0.clear();
+    let upload = Frame::new(0x600 | u16::from(ID), &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap();
+    let _ = device.on_frame(&upload, Instant(10_002), &mut sent);
+    assert_eq!(sent.0.iter().map(Frame::id).collect::<Vec<_>>(), [0x185, 0x585]);
+}

@@ -1,0 +1,100 @@
+//! Properties of the chips that a model of registers alone would not show: pins, errata, a late clock, memory that
+//! decays. docs/evidence.md, Silicon, has the list.
+
+use canbus::Time;
+use chip::Loss;
+use sim::world::World;
+
+use crate::chip_faults::{peek, poke};
+use crate::encoder::{ALARMS, SENSOR_STATE, UNREFERENCED, cycle_power, start};
+use crate::support::{Master, SECOND, images, read, run, running, world};
+
+/// RCC_AHB1ENR, the clocks of the ports; port A, and the distance of two ports (RM0390, 6.3.10 and table 1).
+const AHB1ENR: u32 = 0x4002_3830;
+const PORT_A: u32 = 0x4002_0000;
+const PORT: u32 = 0x400;
+const OSPEEDR: u32 = 0x08;
+const PUPDR: u32 = 0x0C;
+/// 2001h:9.
+const CAN_RESETS: (u16, u8) = (0x2001, 9);
+
+fn log(world: &mut World) -> String {
+    let lines: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+    lines.join("\n")
+}
+
+/// Bits of a pin in a register with two bits for each pin.
+fn of_pin(value: u32, pin: u32) -> u32 {
+    value >> (2 * pin) & 0b11
+}
+
+/// SSI clock at very high speed, CAN TX at medium speed, CAN RX pulled up.
+#[test]
+fn the_pins_of_can_and_ssi_have_their_speed_and_pull_up() {
+    let mut world = running();
+    let (speed, pull) = (peek(&mut world, PORT_A + PORT + OSPEEDR), peek(&mut world, PORT_A + PORT + PUPDR));
+    assert_eq!((of_pin(speed, 13), of_pin(speed, 9), of_pin(pull, 8)), (3, 1, 1), "{speed:08X}h {pull:08X}h");
+}
+
+/// The only digital inputs without a peripheral are the buttons; their lines have pull-up resistors.
+#[test]
+fn no_unused_pin_is_a_floating_input() {
+    let mut world = running();
+    let clocks = peek(&mut world, AHB1ENR);
+    poke(&mut world, AHB1ENR, clocks | 0xFF);
+    let mut inputs = Vec::new();
+    for (port, name) in (0..).zip('A'..='H') {
+        let mode = peek(&mut world, PORT_A + port * PORT);
+        inputs.extend((0..16).filter(|&pin| of_pin(mode, pin) == 0).map(|pin| format!("P{name}{pin}")));
+    }
+    assert_eq!(inputs, ["PC10", "PC13"]);
+}
+
+#[test]
+fn the_images_have_no_code_that_an_erratum_forbids() {
+    for name in callgraph::IMAGES {
+        assert_eq!(callgraph::errata(&images(), name).unwrap(), [""; 0], "{name}");
+    }
+}
+
+/// The clock of the ST-LINK comes seconds after the supply: a cold start, not a crash.
+#[test]
+fn a_cold_start_with_a_late_clock_is_a_power_on() {
+    for seconds in ["0.5", "2.5", "7"] {
+        let mut world = world(&format!("--bitrate 1000 --fault no-crystal@0..{seconds}"));
+        let summary = run(&mut world, SECOND * 10);
+        let log = log(&mut world);
+        let heard = &summary.nodes[0].heard;
+        assert_eq!((heard.boot_ups, heard.emcys), (1, 0), "{seconds} s: {log}");
+        assert!(log.contains("reset by power on"), "{seconds} s: {log}");
+        assert_eq!(log.contains("the clock on OSC_IN was late"), seconds != "0.5", "{seconds} s: {log}");
+    }
+}
+
+/// Without a battery the backup SRAM decays in part: the marks may live while the content does not.
+#[test]
+fn memory_that_has_decayed_in_part_is_lost_and_not_damaged() {
+    let (mut world, master) = start("--fault battery-weak@0");
+    world.take_log();
+    cycle_power(&mut world);
+    let log = log(&mut world);
+    assert!(log.contains("no battery has kept") && !log.contains("is damaged"), "{log}");
+    let state = read(&mut world, &master, SENSOR_STATE);
+    assert_ne!(state & UNREFERENCED, 0, "{state:02X}h, alarms {:04X}h", read(&mut world, &master, ALARMS));
+}
+
+/// The controller does not leave the bus, as with RX held dominant: it is reset, and the node is not.
+#[test]
+fn a_controller_that_does_not_leave_the_bus_is_reset() {
+    let mut world = running();
+    let master = Master::join(&mut world);
+    assert_eq!(read(&mut world, &master, CAN_RESETS), 0);
+    world.machine(0).peripherals_mut().lose(Loss::LeaveBus, 1);
+    master.send(&mut world, 0, &[0x82, 1]);
+    world.run_until(world.now() + Time::from_millis(200));
+    let summary = run(&mut world, SECOND);
+    assert!(summary.nodes[0].incidents.is_empty(), "{summary}");
+    assert_eq!(summary.nodes[0].heard.boot_ups, 2, "{summary}");
+    assert_eq!(read(&mut world, &master, CAN_RESETS), 1);
+    assert!(log(&mut world).contains("lost events of kind 9: 1"));
+}

@@ -1,0 +1,164 @@
+//! Other SDO clients on the bus.
+//!
+//! An SDO channel has one client (CiA 301, 7.2.4): a client that sends a request while a transfer of another client
+//! runs disturbs both. This program cannot know whether it is the only client of a node. So it listens to the transfers
+//! of other clients, and sends its request when none runs.
+
+use std::collections::BTreeMap;
+
+use canopen::{Duration, Frame, Instant, NodeId};
+
+use crate::sdo::Channel;
+use crate::trace::{Transferred, Transfers};
+
+/// A transfer without a frame for this time was given up by its client.
+const GIVEN_UP: Duration = Duration::from_millis(2000);
+
+/// The SDO transfers of other clients. Frames of this program must not be handed over.
+#[derive(Debug, Default)]
+pub(crate) struct OtherClients {
+    default: Servers,
+    /// The additional servers that this program uses.
+    additional: Servers,
+    channels: BTreeMap<NodeId, Channel>,
+}
+
+/// The servers of one kind, one for each node.
+#[derive(Debug, Default)]
+struct Servers {
+    transfers: Transfers,
+    /// The newest request and the newest frame of each server.
+    heard: BTreeMap<NodeId, Heard>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    request: Instant,
+    frame: Instant,
+}
+
+impl OtherClients {
+    /// Takes a frame from the bus. Returns the transfer that the frame has ended.
+    pub(crate) fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<(NodeId, Transferred)> {
+        if let Some((node, channel)) = self.channels.iter().find(|(_, channel)| channel.has(frame)) {
+            let frame = channel.to_default(*node, frame)?;
+            return self.additional.on_frame(*node, &frame, now);
+        }
+        if !matches!(frame.id(), 0x581..=0x5FF | 0x601..=0x67F) {
+            return None;
+        }
+        let node = NodeId::new(u8::try_from(frame.id() & 0x7F).ok()?)?;
+        self.default.on_frame(node, frame, now)
+    }
+
+    /// The channel that this program uses for a node: the default one where no other is set.
+    pub(crate) fn channel(&self, node: NodeId) -> Channel {
+        self.channels.get(&node).copied().unwrap_or(Channel::default_of(node))
+    }
+
+    /// Sets the channel of a node; `None` for the default one.
+    pub(crate) fn set_channel(&mut self, node: NodeId, channel: Option<Channel>) {
+        match channel {
+            Some(channel) => self.channels.insert(node, channel),
+            None => self.channels.remove(&node),
+        };
+    }
+
+    /// Whether another client's transfer runs on the channel that this program uses for a node.
+    pub(crate) fn is_busy(&self, node: NodeId, now: Instant) -> bool {
+        self.servers(node).is_busy(node, now)
+    }
+
+    /// The time since the newest frame of another client's transfer on that channel; `None` where there was none.
+    pub(crate) fn quiet(&self, node: NodeId, now: Instant) -> Option<Duration> {
+        let heard = self.servers(node).heard.get(&node)?;
+        Some(Duration(now.0.saturating_sub(heard.frame.0)))
+    }
+
+    /// The time since the newest request of another client to a node; `None` where there was none.
+    pub(crate) fn since_request(&self, node: NodeId, now: Instant) -> Option<Duration> {
+        let heard = self.default.heard.get(&node)?;
+        Some(Duration(now.0.saturating_sub(heard.request.0)))
+    }
+
+    fn servers(&self, node: NodeId) -> &Servers {
+        if self.channels.contains_key(&node) { &self.additional } else { &self.default }
+    }
+}
+
+impl Servers {
+    fn on_frame(&mut self, node: NodeId, frame: &Frame, now: Instant) -> Option<(NodeId, Transferred)> {
+        let is_request = frame.id() >= 0x600;
+        if is_request {
+            self.heard.insert(node, Heard { request: now, frame: now });
+        } else if self.transfers.has(node) {
+            self.heard.entry(node).and_modify(|heard| heard.frame = now);
+        }
+        let ended = self.transfers.on_frame(node, frame, now);
+        ended.into_iter().next_back().map(|ended| (node, ended))
+    }
+
+    fn is_busy(&self, node: NodeId, now: Instant) -> bool {
+        let is_recent = |heard: &Heard| now.0.saturating_sub(heard.frame.0) < GIVEN_UP.0;
+        self.transfers.has(node) && self.heard.get(&node).is_some_and(is_recent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn node() -> NodeId {
+        NodeId::new(5).unwrap()
+    }
+
+    fn frame(id: u16, data: [u8; 8]) -> Frame {
+        Frame::new(id, &data).unwrap()
+    }
+
+    const READ: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
+    const ANSWER: [u8; 8] = [0x43, 0x00, 0x10, 0, 0x91, 1, 0, 0];
+
+    #[test]
+    fn a_node_is_busy_from_the_request_of_another_client_to_its_answer() {
+        let mut others = OtherClients::default();
+        assert!(!others.is_busy(node(), Instant(0)));
+        assert!(others.on_frame(&frame(0x605, READ), Instant(10)).is_none());
+        assert!(others.is_busy(node(), Instant(20)));
+        assert!(!others.is_busy(NodeId::new(6).unwrap(), Instant(20)));
+        let (of, ended) = others.on_frame(&frame(0x585, ANSWER), Instant(30)).unwrap();
+        assert_eq!((of, ended.read()), (node(), Some(&[0x91, 1, 0, 0][..])));
+        assert!(!others.is_busy(node(), Instant(40)));
+        assert_eq!(others.quiet(node(), Instant(40)), Some(Duration(10)));
+        assert_eq!(others.since_request(node(), Instant(40)), Some(Duration(30)));
+    }
+
+    #[test]
+    fn a_transfer_without_an_answer_is_given_up() {
+        let mut others = OtherClients::default();
+        others.on_frame(&frame(0x605, READ), Instant(0));
+        assert!(others.is_busy(node(), Instant(GIVEN_UP.0 - 1)));
+        assert!(!others.is_busy(node(), Instant(GIVEN_UP.0)));
+    }
+
+    /// The answer to a request of this program does not end the transfer of another client for another object.
+    #[test]
+    fn an_answer_for_another_object_ends_nothing() {
+        let mut others = OtherClients::default();
+        others.on_frame(&frame(0x605, READ), Instant(0));
+        assert!(others.on_frame(&frame(0x585, [0x43, 0x17, 0x10, 0, 1, 0, 0, 0]), Instant(1)).is_none());
+        assert!(others.is_busy(node(), Instant(2)));
+    }
+
+    #[test]
+    fn on_the_second_channel_transfers_on_the_default_one_do_not_matter() {
+        let mut others = OtherClients::default();
+        others.set_channel(node(), Channel::of_cob_ids(0x645, 0x5C5));
+        others.on_frame(&frame(0x605, READ), Instant(0));
+        assert!(!others.is_busy(node(), Instant(1)));
+        others.on_frame(&frame(0x645, READ), Instant(2));
+        assert!(others.is_busy(node(), Instant(3)));
+        others.on_frame(&frame(0x5C5, ANSWER), Instant(4));
+        assert!(!others.is_busy(node(), Instant(5)));
+    }
+}

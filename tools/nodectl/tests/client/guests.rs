@@ -1,0 +1,176 @@
+//! Other SDO clients on the bus: this program waits for their transfers, and leaves them the first channel.
+
+use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use nodectl::bus::Station;
+use nodectl::object::at;
+use nodectl::sdo::Channel;
+
+use crate::commands::printed;
+use crate::pressure::Pressure;
+use crate::wire::{Answers, Wire, client};
+
+fn frame(id: u16, data: [u8; 8]) -> Frame {
+    Frame::new(id, &data).expect("a frame")
+}
+
+/// A node, and another client that reads 1000h from time to time. Each of its transfers takes a while.
+struct Shared {
+    node: Pressure,
+    /// When the next transfer begins, and when the present one ends.
+    begin: Instant,
+    end: Option<Instant>,
+    /// The pause between two transfers.
+    pause: Duration,
+    /// Requests of this program that came into a transfer of the other client.
+    collisions: usize,
+}
+
+const TRANSFER: Duration = Duration::from_millis(40);
+
+impl Station for Shared {
+    fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if frame.id() == 0x601 {
+            self.collisions += usize::from(self.end.is_some());
+        }
+        self.node.receive(frame, now, out);
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        match self.end {
+            Some(end) if now >= end => {
+                let _ = out.send(frame(0x581, [0x43, 0x00, 0x10, 0, 0x94, 1, 2, 0]));
+                (self.end, self.begin) = (None, now + self.pause);
+            }
+            None if now >= self.begin => {
+                let _ = out.send(frame(0x601, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
+                self.end = Some(now + TRANSFER);
+            }
+            _ => (),
+        }
+        self.node.poll(now, out).min(self.end.unwrap_or(self.begin))
+    }
+}
+
+fn shared(pause: u64) -> Wire<Shared> {
+    let pause = Duration::from_millis(pause);
+    Wire::new(Shared { node: Pressure::new(1), begin: Instant(0), end: None, pause, collisions: 0 })
+}
+
+#[test]
+fn a_request_waits_for_the_transfer_of_another_client() {
+    // A client that pauses, and one that never does.
+    for pause in [200, 5] {
+        let wire = shared(pause);
+        let mut network = wire.network();
+        network.pause(Duration::from_millis(5)).expect("a bus");
+        for _ in 0..5 {
+            let value = client(&mut network, 1).upload(at(0x1017, 0)).expect("a value");
+            assert_eq!(value, 1000_u16.to_le_bytes());
+        }
+        assert_eq!(wire.station(|shared| shared.collisions), 0, "pause of {pause} ms");
+    }
+}
+
+#[test]
+fn a_client_that_does_not_end_its_transfer_is_waited_for_and_then_passed() {
+    let wire = shared(200);
+    let mut network = wire.network();
+    network.pause(Duration::from_millis(5)).expect("a bus");
+    wire.station(|shared| shared.end = Some(Instant(u64::MAX)));
+    let before = network.now();
+    client(&mut network, 1).upload(at(0x1017, 0)).expect("a value");
+    assert!(network.now().0 - before.0 >= 1_900_000, "two seconds after its request");
+}
+
+/// A node with a second SDO server, and the CAN-IDs of the requests that it has got.
+struct Second {
+    node: Pressure,
+    cob_ids: [u32; 2],
+    requests: Vec<(u16, u16)>,
+}
+
+impl Station for Second {
+    fn receive(&mut self, received: &Frame, now: Instant, out: &mut impl Transmit) {
+        let (id, data) = (received.id(), received.data());
+        let Ok(data) = <[u8; 8]>::try_from(data) else { return self.node.receive(received, now, out) };
+        if ![0x601, 0x641].contains(&id) {
+            return self.node.receive(received, now, out);
+        }
+        let index = u16::from_le_bytes([data[1], data[2]]);
+        self.requests.push((id, index));
+        if let (0x40, 0x1201, sub @ 1..=2) = (data[0], index, data[3]) {
+            let [a, b, c, d] = self.cob_ids[usize::from(sub) - 1].to_le_bytes();
+            let _ = out.send(frame(id - 0x80, [0x43, 0x01, 0x12, sub, a, b, c, d]));
+            return;
+        }
+        let mut answers = Answers::default();
+        self.node.receive(&frame(0x601, data), now, &mut answers);
+        for answer in answers.0 {
+            let is_response = answer.id() == 0x581;
+            let answer =
+                if is_response { Frame::new(id - 0x80, answer.data()).expect("a frame") } else { answer };
+            let _: Result<(), QueueFull> = out.send(answer);
+        }
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        self.node.poll(now, out)
+    }
+}
+
+fn second(cob_ids: [u32; 2]) -> Wire<Second> {
+    Wire::new(Second { node: Pressure::new(1), cob_ids, requests: Vec::new() })
+}
+
+/// A data sheet with 1201h.
+fn sheet() -> String {
+    let path = format!("{}/second-server.eds", env!("CARGO_TARGET_TMPDIR"));
+    let entry = |sub: u8, name: &str, kind: u8, access: &str| {
+        format!(
+            "[1201sub{sub}]\nParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType={access}\n\n"
+        )
+    };
+    let object = "\n[1201]\nParameterName=SDO server parameter\nObjectType=0x9\nSubNumber=3\n\n".to_owned()
+        + &entry(0, "Highest sub-index supported", 5, "ro")
+        + &entry(1, "COB-ID client to server", 7, "rw")
+        + &entry(2, "COB-ID server to client", 7, "rw");
+    let text = eds::DEVICES[0].sheet(&eds::Edition::default()) + &object;
+    std::fs::write(&path, text).expect("a file");
+    path
+}
+
+#[test]
+fn the_second_sdo_server_is_used_where_it_is_switched_on() {
+    for (cob_ids, id) in [
+        ([0x641, 0x5C1], 0x641),
+        ([0x8000_0641, 0x8000_05C1], 0x601),
+        ([0x641, 0x8000_05C1], 0x601),
+        ([0x2000_0641, 0x5C1], 0x601),
+    ] {
+        let wire = second(cob_ids);
+        let line = printed(&wire, &["read", "1017", "--eds", &sheet()]);
+        assert!(line.contains("= 1000 ms"), "{line}");
+        let requests = wire.station(|second| second.requests.clone());
+        assert_eq!(requests.last(), Some(&(id, 0x1017)), "{cob_ids:X?}");
+        // Its parameters are read on the channel that is always there.
+        assert!(requests.iter().all(|(id, index)| *index == 0x1017 || *id == 0x601), "{requests:X?}");
+    }
+    // Without a data sheet that has the object, nothing is asked for it.
+    let wire = second([0x641, 0x5C1]);
+    printed(&wire, &["read", "1017"]);
+    assert!(wire.station(|second| second.requests.iter().all(|(_, index)| *index != 0x1201)));
+}
+
+#[test]
+fn after_a_boot_and_after_silence_the_default_server_is_used() {
+    let node = NodeId::new(1).expect("a node-ID");
+    let additional = Channel::of_cob_ids(0x641, 0x5C1);
+    let wire = Wire::new(Pressure::new(1));
+    let mut network = wire.network();
+    network.set_channel(node, additional);
+    network.pause(Duration::from_millis(5)).expect("a bus");
+    assert_eq!(network.channel(node), Channel::default_of(node), "the node has booted");
+    network.set_channel(node, additional);
+    client(&mut network, 1).upload(at(0x1017, 0)).expect_err("no such server");
+    client(&mut network, 1).upload(at(0x1017, 0)).expect("the default server");
+}
