@@ -153,3 +153,18 @@ fn text(output: &Output) -> String {
     let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
     format!("{err}{out}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mend_is_in_its_file_once() {
+        for Mend { finding, edits, .. } in MENDS {
+            for Edit { file, mended, .. } in *edits {
+                let content = fs::read_to_string(root().join(file)).expect(file);
+                assert_eq!(content.matches(mended).count(), 1, "{finding}: {file}: {mended}");
+            }
+        }
+    }
+}

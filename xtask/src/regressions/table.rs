@@ -185,12 +185,12 @@ pub(super) const MENDS: &[Mend] = &[
         edits: &[
             Edit {
                 file: "crates/canopen/src/device/full.rs",
-                mended: "        if self.basic.state.has_services() {\n            self.emcy.poll(context);\n        }\n        self.react();",
-                fault: "        self.react();\n        if self.basic.state.has_services() {\n            self.emcy.poll(context);\n        }",
+                mended: "        if Self::has(Services::EMCY) && self.basic.state.has_services() {\n            self.emcy.poll(context);\n        }\n        self.react();",
+                fault: "        self.react();\n        if Self::has(Services::EMCY) && self.basic.state.has_services() {\n            self.emcy.poll(context);\n        }",
             },
             Edit {
                 file: "crates/canopen/src/device/faults.rs",
-                mended: "if has_to_stop && self.emcy.is_idle() && !self.is_bus_off {",
+                mended: "if has_to_stop && (!Self::has(Services::EMCY) || self.emcy.is_idle()) && !self.is_bus_off {",
                 fault: "if has_to_stop {",
             },
         ],
