@@ -35,6 +35,11 @@ impl Boot {
         self.is_updated = true;
     }
 
+    /// Whether the programs of the node change: a bootloader that copies a program sends no heartbeat meanwhile.
+    pub(crate) fn is_updating(&self) -> bool {
+        self.is_updated
+    }
+
     /// Whether the boot-up message of a restart is awaited.
     pub(crate) fn is_waiting(&self) -> bool {
         self.since.is_some()

@@ -311,7 +311,11 @@ impl Device {
         let starts_itself = self.values.sure_number(0x1F80, 0).is_none_or(|start| start != 0);
         self.nmt.boot_up(starts_itself);
         self.errors.boot_up(self.values.sheet().is_some_and(|sheet| sheet.forgets_errors));
-        self.heartbeat.begin(at);
+        if self.boot.is_updating() {
+            self.heartbeat.pause();
+        } else {
+            self.heartbeat.begin(at);
+        }
     }
 
     fn on_heartbeat(&mut self, data: &[u8], at: Instant, findings: &mut Findings) {
