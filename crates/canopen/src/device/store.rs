@@ -110,18 +110,7 @@ impl<
         self.finish_job(result, lss_waits, context);
         self.process_next()
     }
-}
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Device<A, N, T, R, W, M, S>
-{
     /// Whether a pause of `span` disturbs no service, for example while the erase of a flash page stops the core. The
     /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
     /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and no heartbeat of another node (1016h) is
