@@ -24,17 +24,41 @@ pub(super) struct Edit {
     pub(super) fault: &'static str,
 }
 
+/// A deadline in the past reaches the caller.
+const PAST_DEADLINES: Edit = Edit {
+    file: "crates/canopen/src/device/process.rs",
+    mended: "self.basic.process_due = due.max(context.now.plus(Duration(1)));",
+    fault: "self.basic.process_due = due;",
+};
+
+/// PDOs take the whole bus.
+const NO_SHARE: &[Edit] = &[Edit {
+    file: "crates/canopen/src/pdo/budget.rs",
+    mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
+    fault: "true || self.admits_scarce(id, len, now)",
+}];
+
+/// A write that cannot be stored is refused after its effect.
+const CHECK_AFTER_EFFECT: &[Edit] = &[
+    Edit {
+        file: "crates/canopen/src/device/objects.rs",
+        mended: "let job = self.check_store(entry)?;",
+        fault: "let job = self.check_store(entry);",
+    },
+    Edit {
+        file: "crates/canopen/src/device/objects.rs",
+        mended: "job.map_or(Ok(()), |job| self.store_at_once(job))",
+        fault: "job?.map_or(Ok(()), |job| self.store_at_once(job))",
+    },
+];
+
 pub(super) const MENDS: &[Mend] = &[
     Mend {
         finding: "K21",
         rule: "deadline",
         scenario: "deadlines::button_calls_on_a_busy_bus_leave_all_deadlines_in_the_future",
         edits: &[
-            Edit {
-                file: "crates/canopen/src/device/process.rs",
-                mended: "self.basic.process_due = due.max(context.now.plus(Duration(1)));",
-                fault: "self.basic.process_due = due;",
-            },
+            PAST_DEADLINES,
             Edit {
                 file: "crates/canopen/src/pdo/tpdo.rs",
                 mended: "        let number = self.events_of()?;\n        let settings = &self.settings;\n        let is_asked_now",
@@ -52,11 +76,7 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "deadline",
         scenario: "deadlines::a_deselected_multiplexed_tpdo_has_no_deadline_in_the_past",
         edits: &[
-            Edit {
-                file: "crates/canopen/src/device/process.rs",
-                mended: "self.basic.process_due = due.max(context.now.plus(Duration(1)));",
-                fault: "self.basic.process_due = due;",
-            },
+            PAST_DEADLINES,
             Edit {
                 file: "crates/canopen/src/pdo/scanner.rs",
                 mended: "if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {",
@@ -68,11 +88,7 @@ pub(super) const MENDS: &[Mend] = &[
         finding: "P25",
         rule: "heartbeat-late",
         scenario: "starving::a_tpdo_every_millisecond_leaves_room_at_every_bit_rate",
-        edits: &[Edit {
-            file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
-            fault: "true || self.admits_scarce(id, len, now)",
-        }],
+        edits: NO_SHARE,
     },
     Mend {
         finding: "P25, events",
@@ -88,31 +104,19 @@ pub(super) const MENDS: &[Mend] = &[
         finding: "P25, noise",
         rule: "heartbeat-late",
         scenario: "starving::a_noisy_pressure_without_inhibit_time_leaves_room",
-        edits: &[Edit {
-            file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
-            fault: "true || self.admits_scarce(id, len, now)",
-        }],
+        edits: NO_SHARE,
     },
     Mend {
         finding: "L25",
         rule: "heartbeat-late",
         scenario: "starving::three_position_units_of_a_lift_leave_room_by_their_defaults",
-        edits: &[Edit {
-            file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
-            fault: "true || self.admits_scarce(id, len, now)",
-        }],
+        edits: NO_SHARE,
     },
     Mend {
         finding: "E34",
         rule: "heartbeat-late",
         scenario: "starving::a_cyclic_timer_of_a_millisecond_leaves_room",
-        edits: &[Edit {
-            file: "crates/canopen/src/pdo/budget.rs",
-            mended: "self.credit >= self.enough || self.admits_scarce(id, len, now)",
-            fault: "true || self.admits_scarce(id, len, now)",
-        }],
+        edits: NO_SHARE,
     },
     Mend {
         finding: "P28, writes",
@@ -148,35 +152,13 @@ pub(super) const MENDS: &[Mend] = &[
         finding: "C22, E27",
         rule: "abort-acted",
         scenario: "aborts::a_preset_of_an_encoder_is_in_force_or_refused",
-        edits: &[
-            Edit {
-                file: "crates/canopen/src/device/objects.rs",
-                mended: "let job = self.check_store(entry)?;",
-                fault: "let job = self.check_store(entry);",
-            },
-            Edit {
-                file: "crates/canopen/src/device/objects.rs",
-                mended: "job.map_or(Ok(()), |job| self.store_at_once(job))",
-                fault: "job?.map_or(Ok(()), |job| self.store_at_once(job))",
-            },
-        ],
+        edits: CHECK_AFTER_EFFECT,
     },
     Mend {
         finding: "C22, L24",
         rule: "abort-acted",
         scenario: "aborts::a_preset_of_a_position_unit_is_in_force_or_refused",
-        edits: &[
-            Edit {
-                file: "crates/canopen/src/device/objects.rs",
-                mended: "let job = self.check_store(entry)?;",
-                fault: "let job = self.check_store(entry);",
-            },
-            Edit {
-                file: "crates/canopen/src/device/objects.rs",
-                mended: "job.map_or(Ok(()), |job| self.store_at_once(job))",
-                fault: "job?.map_or(Ok(()), |job| self.store_at_once(job))",
-            },
-        ],
+        edits: CHECK_AFTER_EFFECT,
     },
     Mend {
         finding: "P21",
