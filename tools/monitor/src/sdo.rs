@@ -4,6 +4,7 @@
 //! until the next initiate request.
 
 use canopen::Instant;
+use crc::{CRC_16_XMODEM, Crc};
 
 use crate::{Findings, Key, Rule};
 
@@ -11,8 +12,6 @@ use crate::{Findings, Key, Rule};
 const KEPT: usize = 1 << 20;
 /// The time for an answer in us.
 const TIME_OUT: u64 = 1_000_000;
-/// CRC-16 of block transfers.
-const POLYNOMIAL: u16 = 0x1021;
 
 /// The server's next frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -518,9 +517,5 @@ fn block_upload(data: [u8; 8]) -> Option<Transfer> {
 }
 
 fn crc(data: &[u8]) -> u16 {
-    data.iter().fold(0, |crc, byte| {
-        (0..8).fold(crc ^ u16::from(*byte) << 8, |crc, _| {
-            if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ POLYNOMIAL }
-        })
-    })
+    Crc::<u16>::new(&CRC_16_XMODEM).checksum(data)
 }

@@ -1,9 +1,11 @@
 //! CAN1: bring-up, filters and state. The mailboxes are in `transmit` and `receive`.
-
 //!
-//! The crate bxcan is not used: it waits without a bound for each change of the mode, and the controller changes its
-//! mode only when the frame on the bus has ended. With RX held dominant it may never do so.
+//! The crate bxcan waits without a bound for each change of the mode. The changes between initialisation and sleep need
+//! no bus (RM0390, 30.4). To leave the bus, the controller waits for the end of a frame, and with RX held dominant it may
+//! wait for ever: that change has a bound here.
 
+use bxcan::filter::Mask16;
+use bxcan::{Interrupts, StandardId};
 use canopen::Duration;
 use stm32f4xx_hal::can::Can as Pins;
 use stm32f4xx_hal::gpio::{PB8, PB9, Speed};
@@ -18,10 +20,26 @@ use crate::bus_state::BusState;
 use crate::filters::{self, BANKS, Bank, Fifo, Pair};
 use crate::losses::{Event, Losses};
 
+/// The registers for the crate bxcan.
+pub(crate) struct Registers;
+
+// SAFETY: CAN1 is owned by `Controller`. The parts that share its registers use disjoint ones: the controller uses
+// those of mode, timing, errors and filters, the transmitter those of the transmit mailboxes, each receiver those of
+// its FIFO.
+unsafe impl bxcan::Instance for Registers {
+    const REGISTERS: *mut bxcan::RegisterBlock = CAN1::ptr().cast_mut().cast();
+}
+
+// SAFETY: CAN1 owns all banks of the pair CAN1 and CAN2 (RM0390, 30.7.4).
+unsafe impl bxcan::FilterOwner for Registers {
+    const NUM_FILTER_BANKS: u8 = BANKS as u8;
+}
+
+// SAFETY: as above; CAN2 is the slave and stays off.
+unsafe impl bxcan::MasterInstance for Registers {}
+
 pub(crate) fn registers() -> &'static can1::RegisterBlock {
-    // SAFETY: CAN1 is owned by `Controller`. The parts that share its registers use disjoint ones: the controller uses
-    // those of mode, timing, errors and filters, the transmitter those of the transmit mailboxes, each receiver those of
-    // its FIFO.
+    // SAFETY: see the implementation of `Instance`; each caller uses its own registers only.
     unsafe { &*CAN1::ptr() }
 }
 
@@ -33,6 +51,7 @@ pub(super) fn hold_in_reset() {
 
 /// Mode, timing, filters and errors of the controller.
 pub struct Controller {
+    can: bxcan::Can<Registers>,
     losses: &'static Losses,
     _pins: Pins<CAN1>,
 }
@@ -52,7 +71,9 @@ impl Controller {
     ) -> (Controller, Transmitter) {
         let tx = tx.into_alternate::<9>().speed(Speed::Medium);
         let rx = rx.into_alternate::<9>().internal_pull_up(true);
-        (Controller { losses, _pins: Pins::new(can, (tx, rx), rcc) }, Transmitter::new())
+        let pins = Pins::new(can, (tx, rx), rcc);
+        let can = bxcan::Can::builder(Registers).leave_disabled();
+        (Controller { can, losses, _pins: pins }, Transmitter::new())
     }
 
     /// Goes on the bus, or restarts on the bus: drops the content of the mailboxes and takes new timing and filters.
@@ -70,17 +91,14 @@ impl Controller {
     fn join(&mut self, timing: BitTiming, banks: &[Bank], silent: bool) {
         registers().tsr().write(|w| w.abrq0().set_bit().abrq1().set_bit().abrq2().set_bit());
         self.stop();
-        registers().btr().write(|w| {
-            // SAFETY: `BitTiming` asserts that its values fit the register.
-            unsafe { w.bits(timing.btr()) };
-            w.silm().bit(silent)
-        });
+        self.can.modify_config().set_bit_timing(timing.btr()).set_silent(silent).leave_disabled();
         self.set_filters(banks);
-        enable_interrupts();
+        self.enable_interrupts();
         self.mark_error_code();
-        // The controller joins after 11 recessive bits. The automatic return from bus-off is off: `crate::back_off`
-        // decides on the return.
-        registers().mcr().modify(|_, w| w.abom().clear_bit().sleep().clear_bit().inrq().clear_bit());
+        // Clears the sleep request; the controller joins after 11 recessive bits.
+        let _ = self.can.enable_non_blocking();
+        // bxcan has enabled the automatic return from bus-off; `crate::back_off` decides on the return instead.
+        registers().mcr().modify(|_, w| w.abom().clear_bit());
     }
 
     /// Leaves the bus for initialisation, at the end of the frame on the bus. A controller that does not leave the bus
@@ -132,32 +150,13 @@ impl Controller {
         registers().esr().modify(|_, w| unsafe { w.lec().bits(UNTOUCHED) });
     }
 
-    /// Replaces the filters. Frames that end during the change, a few microseconds, are not received. CAN1 owns all
-    /// banks of the pair CAN1 and CAN2, and each bank has two pairs of identifier and mask (RM0390, 30.7.4).
+    /// Replaces the filters. Frames that end during the change, a few microseconds, are not received.
     pub fn set_filters(&mut self, banks: &[Bank]) {
-        let can = registers();
-        // SAFETY: the value is the number of banks.
-        can.fmr().modify(|_, w| unsafe { w.finit().set_bit().can2sb().bits(BANKS as u8) });
-        let [mut active, mut services, mut bit] = [0, 0, 1];
-        for (place, bank) in can.fb_iter().zip(banks) {
-            let [first, second] = bank.pairs.map(Pair::register);
-            // SAFETY: any identifiers and masks.
-            unsafe {
-                place.fr1().write(|w| w.bits(first));
-                place.fr2().write(|w| w.bits(second));
-            }
-            active |= bit;
-            services |= if bank.fifo == Fifo::Services { bit } else { 0 };
-            bit <<= 1;
+        let mut filters = self.can.modify_filters();
+        filters.set_split(BANKS as u8).clear();
+        for (index, bank) in (0..BANKS as u8).zip(banks) {
+            filters.enable_bank(index, fifo(bank.fifo), masks(bank));
         }
-        // SAFETY: a bit for each bank in all of these registers.
-        unsafe {
-            can.fm1r().write(|w| w.bits(0));
-            can.fs1r().write(|w| w.bits(0));
-            can.ffa1r().write(|w| w.bits(services));
-            can.fa1r().write(|w| w.bits(active));
-        }
-        can.fmr().modify(|_, w| w.finit().clear_bit());
     }
 
     /// State of the fault confinement; acknowledges the error interrupt.
@@ -165,14 +164,19 @@ impl Controller {
         acknowledge_error();
         BusState::from_esr(registers().esr().read().bits())
     }
-}
 
-/// Enables the interrupts of the mailboxes, of both FIFOs and of changes of the fault confinement.
-fn enable_interrupts() {
-    registers().ier().write(|w| {
-        w.tmeie().set_bit().fmpie0().set_bit().fmpie1().set_bit().errie().set_bit();
-        w.ewgie().set_bit().epvie().set_bit().bofie().set_bit()
-    });
+    fn enable_interrupts(&mut self) {
+        self.can.enable_interrupts(
+            Interrupts::TRANSMIT_MAILBOX_EMPTY
+                | Interrupts::FIFO0_MESSAGE_PENDING
+                | Interrupts::FIFO1_MESSAGE_PENDING
+                | Interrupts::ERROR,
+        );
+        // The events that count as errors for the last of these interrupts; bxcan cannot set them.
+        registers()
+            .ier()
+            .modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit().lecie().clear_bit());
+    }
 }
 
 /// Requests initialisation, and waits until the controller acknowledges it and has left sleep.
@@ -205,3 +209,18 @@ const LONGEST_FRAME: Duration = Duration::from_millis(25);
 const NO_ERROR: u8 = 0;
 const NO_ACKNOWLEDGE: u8 = 3;
 const UNTOUCHED: u8 = 7;
+
+fn fifo(fifo: Fifo) -> bxcan::Fifo {
+    match fifo {
+        Fifo::Process => bxcan::Fifo::Fifo0,
+        Fifo::Services => bxcan::Fifo::Fifo1,
+    }
+}
+
+fn masks(bank: &Bank) -> [Mask16; 2] {
+    bank.pairs.map(|Pair { id, mask }| Mask16::frames_with_std_id(standard(id), standard(mask)))
+}
+
+fn standard(id: u16) -> StandardId {
+    StandardId::new(id).unwrap_or(StandardId::MAX)
+}
