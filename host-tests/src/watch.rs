@@ -212,9 +212,8 @@ fn read(node: u8, (index, sub): Key, ask: &mut impl FnMut(&Frame, &mut Answers))
 /// The data sheet of a personality.
 #[must_use]
 pub fn sheet(personality: Personality) -> Sheet {
-    let mut sheet = Sheet::from(personality.rows());
-    // The personality, and the choice of virtual devices of a lift, which switches on the PDOs that are off by default.
-    sheet.changes_pdos.extend([0x2000, 0x2305]);
+    let mut sheet = Sheet::of_node(personality.rows());
+    // The choice of virtual devices of a lift switches on PDOs that are off by default.
     let is_off = |initial: &Initial| matches!(initial, Initial::Bytes(bytes) if bytes.last() >= Some(&0x80));
     let pdos = sheet.entries.range_mut((0x1800, 0)..(0x1A00, 0)).filter(|(key, _)| key.1 == 1);
     for (_, entry) in pdos.filter(|(_, entry)| personality == Personality::Lift && is_off(&entry.initial)) {

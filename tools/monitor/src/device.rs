@@ -10,6 +10,7 @@ use crate::heartbeat::Heartbeat;
 use crate::nmt::Nmt;
 use crate::pdo::{self, Pdos, Times};
 use crate::sdo::{Channel, Event};
+use crate::sheet::PERSONALITY;
 use crate::values::{Scope, Values};
 use crate::{Findings, Key, Rule};
 
@@ -20,8 +21,6 @@ const RESET_COMMUNICATION: u8 = 130;
 pub(crate) const LSS_RESPONSE: u16 = 0x7E4;
 /// Objects that start and stop programs (CiA 302-3), and object 2002h of this project, which ends a trial.
 const PROGRAM: [u16; 5] = [0x1F50, 0x1F51, 0x1F56, 0x1F57, 0x2002];
-/// Object of this project: the personality, with which another data sheet applies after the next reset.
-const PERSONALITY: u16 = 0x2000;
 
 /// A node.
 #[derive(Debug)]
@@ -252,6 +251,7 @@ impl Device {
                 match key.0 {
                     0x1017 => self.heartbeat.begin(now),
                     0x1800..=0x19FF => self.pdos.configured(key.0, key.1, was_off),
+                    // Another data sheet applies after the next reset.
                     PERSONALITY => self.values.forget_sheet(),
                     _ => (),
                 }

@@ -97,7 +97,19 @@ impl Entry {
     }
 }
 
+/// Objects of this project: the personality, and the choice of virtual devices of a lift.
+pub(crate) const PERSONALITY: u16 = 0x2000;
+const VIRTUAL_DEVICES: u16 = 0x2305;
+
 impl Sheet {
+    /// The sheet of a node of this project, some of whose own objects change the parameters of PDOs.
+    #[must_use]
+    pub fn of_node(rows: &[Object]) -> Sheet {
+        let mut sheet = Sheet::from(rows);
+        sheet.changes_pdos.extend([PERSONALITY, VIRTUAL_DEVICES]);
+        sheet
+    }
+
     /// Whether a client's value of the object must last. Without a data sheet: the communication parameters that CiA
     /// 301 defines.
     pub(crate) fn is_parameter(sheet: Option<&Sheet>, key: Key) -> bool {

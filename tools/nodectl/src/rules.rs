@@ -7,9 +7,6 @@ use canopen::NodeId;
 use eds::{Access, Class, DEVICES, Eds, Entry, Formula, Value};
 use monitor::{Initial, Kind, Sheet};
 
-/// The personality of a node of this project, and the choice of virtual devices of a lift: both change its PDOs.
-const CHOICES: [u16; 2] = [0x2000, 0x2305];
-
 /// A node and the name of its device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Device {
@@ -40,9 +37,7 @@ impl Device {
     pub fn sheet(&self) -> Result<Sheet, String> {
         let own = DEVICES.iter().find(|device| device.file_name == format!("{}.eds", self.name));
         if let Some(own) = own {
-            let mut sheet = Sheet::from(own.rows);
-            sheet.changes_pdos.extend(CHOICES);
-            return Ok(sheet);
+            return Ok(Sheet::of_node(own.rows));
         }
         let bytes = fs::read(&self.name).map_err(|error| error.to_string())?;
         let sheet = Eds::from_bytes(&bytes).map_err(|error| error.to_string())?;

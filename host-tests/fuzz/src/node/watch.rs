@@ -12,10 +12,7 @@ impl Watch {
     /// A monitor that knows neither the values nor the state of the node.
     pub(super) fn new(personality: Personality, node_id: Option<u16>) -> Watch {
         let mut monitor = Monitor::new().without_bus();
-        let mut sheet = Sheet::from(personality.rows());
-        // The personality, and the choice of virtual devices of a lift.
-        sheet.changes_pdos.extend([0x2000, 0x2305]);
-        monitor.set_sheet(0, sheet, false);
+        monitor.set_sheet(0, Sheet::of_node(personality.rows()), false);
         if let Some([node_id, _]) = node_id.map(u16::to_le_bytes) {
             monitor.set_node_id(0, node_id);
         }

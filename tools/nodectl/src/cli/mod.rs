@@ -24,6 +24,7 @@ mod session;
 mod sheets;
 mod store;
 mod trace;
+mod traffic;
 mod trial;
 mod update;
 mod write;

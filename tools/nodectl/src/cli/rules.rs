@@ -1,8 +1,6 @@
 //! `nodectl rules`
 
 use std::fmt;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use canopen::{Duration, Frame, Instant, NodeId};
@@ -11,15 +9,13 @@ use monitor::{Breach, Monitor, Rule, Sender};
 use serde::Serialize;
 
 use super::node_set::NodeSet;
+use super::traffic::{Listening, Records};
 use super::{Failure, Session};
 use crate::rules::{self, Device};
 use crate::text::hex_digits;
-use crate::trace::parse_candump;
 
 /// The longest wait for a frame, after which the end of the run is checked.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// The greatest length of a line of a file: ten times a line of candump.
-const LONGEST_LINE: u64 = 1024;
 
 /// Judges the traffic on the bus by the rules of CiA 301 and by the settings of the nodes; sends nothing.
 ///
@@ -160,50 +156,25 @@ impl Rules {
 
 impl Judge<'_> {
     fn bus(&mut self, session: &mut Session) -> Result<(), Failure> {
-        let begin = session.network.now();
-        let time = self.rules.seconds.map(|seconds| Duration::from_millis(u64::from(seconds) * 1000));
-        let mut start = None;
+        let mut listening = Listening::begin(session, self.rules.seconds, PATIENCE);
         loop {
-            let until = session.network.now() + PATIENCE;
-            if let Some(received) = session.network.receive(until)? {
-                start.get_or_insert(received.at);
+            if let Some(received) = listening.receive(session)? {
                 self.frame(session, &received.frame, received.at)?;
             }
-            // Use the clock of the bus once there is one: virtual time may be faster or slower than real time.
-            let times = start.zip(session.network.bus_time());
-            if let Some((_, now)) = times {
+            if let Some(now) = listening.bus_time(session) {
                 self.monitor.advance(now);
                 self.print(session)?;
             }
-            let (start, now) = times.unwrap_or((begin, session.network.now()));
-            if time.is_some_and(|time| now.0.saturating_sub(start.0) >= time.0) {
+            if listening.is_over(session) {
                 return Ok(());
             }
         }
     }
 
     fn file(&mut self, session: &mut Session, path: &Path) -> Result<(), Failure> {
-        let input: Box<dyn Read> = if path.as_os_str() == "-" {
-            Box::new(io::stdin())
-        } else {
-            Box::new(File::open(path).map_err(|error| Failure::file(path, error))?)
-        };
-        let mut input = BufReader::new(input);
-        let mut bytes = Vec::new();
         let mut begin = None;
-        for number in 1_u64.. {
-            bytes.clear();
-            let read = (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut bytes);
-            if read.map_err(|error| Failure::file(path, error))? == 0 {
-                break;
-            }
-            let line = String::from_utf8_lossy(&bytes);
-            if line.trim().is_empty() {
-                continue;
-            }
-            let record = parse_candump(line.trim())
-                .map_err(|error| Failure::file(path, format!("line {number}: {error}")))?;
-            let Some((at, frame)) = record else { continue };
+        for record in Records::open(path)? {
+            let (at, frame) = record?;
             let begin = *begin.get_or_insert(at);
             let is_over = |seconds: u32| at.0.saturating_sub(begin.0) > u64::from(seconds) * 1_000_000;
             if self.rules.seconds.is_some_and(is_over) {

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -15,19 +13,18 @@ use serde::Serialize;
 use super::node_set::NodeSet;
 use super::read::place;
 use super::record::seconds_between;
+use super::traffic::{Listening, Records};
 use super::{Failure, Session};
 use crate::Catalogue;
 use crate::scan::scan;
 use crate::text::{hex_digits, visible};
-use crate::trace::{Decoder, Kind, Knowledge, Line, Shown, parse_candump};
+use crate::trace::{Decoder, Kind, Knowledge, Line, Shown};
 use crate::value::Value;
 
 /// The longest wait for a frame, after which the end of the trace is checked.
 const PATIENCE: Duration = Duration::from_millis(200);
 /// How long to listen for nodes before their objects are read.
 const LISTEN: Duration = Duration::from_millis(300);
-/// The greatest length of a line of a file: ten times a line of candump.
-const LONGEST_LINE: u64 = 1024;
 
 /// Shows the traffic on the bus: every frame decoded, with names, values and units; a transfer of several frames is one
 /// line.
@@ -169,17 +166,12 @@ impl Trace {
 
 impl Printer<'_> {
     fn bus(&mut self, session: &mut Session) -> Result<(), Failure> {
-        let time = self.trace.seconds.map(|seconds| Duration::from_millis(u64::from(seconds) * 1000));
-        let begin = session.network.now();
+        let mut listening = Listening::begin(session, self.trace.seconds, PATIENCE);
         while self.left > 0 {
-            let until = session.network.now() + PATIENCE;
-            if let Some(received) = session.network.receive(until)? {
+            if let Some(received) = listening.receive(session)? {
                 self.frame(session, &received.frame, received.at)?;
             }
-            // Use the clock of the bus once there is one: virtual time may be faster or slower than real time.
-            let (start, now) =
-                self.start.zip(session.network.bus_time()).unwrap_or((begin, session.network.now()));
-            if time.is_some_and(|time| now.0.saturating_sub(start.0) >= time.0) {
+            if listening.is_over(session) {
                 break;
             }
         }
@@ -187,28 +179,12 @@ impl Printer<'_> {
     }
 
     fn file(&mut self, session: &mut Session, path: &Path) -> Result<(), Failure> {
-        let input: Box<dyn Read> = if path.as_os_str() == "-" {
-            Box::new(io::stdin())
-        } else {
-            Box::new(File::open(path).map_err(|error| Failure::file(path, error))?)
-        };
-        let mut input = BufReader::new(input);
-        let mut bytes = Vec::new();
-        for number in 1_u64.. {
-            bytes.clear();
-            let read = (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut bytes);
-            if read.map_err(|error| Failure::file(path, error))? == 0 || self.left == 0 {
-                break;
-            }
-            let line = String::from_utf8_lossy(&bytes);
-            if line.trim().is_empty() {
-                continue;
-            }
-            let record = parse_candump(line.trim())
-                .map_err(|error| Failure::file(path, format!("line {number}: {error}")))?;
-            if let Some((at, frame)) = record {
-                self.frame(session, &frame, at)?;
-            }
+        let mut records = Records::open(path)?;
+        while self.left > 0
+            && let Some(record) = records.next()
+        {
+            let (at, frame) = record?;
+            self.frame(session, &frame, at)?;
         }
         Ok(())
     }
