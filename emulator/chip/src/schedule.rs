@@ -36,6 +36,7 @@ impl Peripherals for Stm32f4 {
         self.pass(now);
         self.flash.advance(now, &mut self.effects);
         self.flash.program(address, old, new, now, &mut self.effects)?;
+        self.check_flash_supply(now);
         self.settle(now);
         Ok(())
     }

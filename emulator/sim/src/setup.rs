@@ -44,8 +44,8 @@ pub fn world(options: &Options) -> Result<World> {
     for oscillator in &options.oscillator {
         ensure!(options.nodes.iter().any(|node| oscillator.is_for(node.id)), "an oscillator is for nobody");
     }
-    let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
-    let stimuli = [pressure, temperature, thermistor, shaft, button, fault].into_iter().flatten();
+    let Options { pressure, temperature, thermistor, supply, shaft, button, fault, .. } = options;
+    let stimuli = [pressure, temperature, thermistor, supply, shaft, button, fault].into_iter().flatten();
     for stimulus in stimuli {
         world.apply(stimulus).context("a stimulus is for nobody")?;
     }

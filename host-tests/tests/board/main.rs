@@ -34,6 +34,7 @@ mod sensor_faults;
 mod silicon;
 mod stack;
 mod start_up;
+mod supply;
 mod support;
 mod timing;
 mod update;

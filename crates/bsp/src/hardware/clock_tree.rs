@@ -14,6 +14,8 @@ const MULTIPLIER_N: u16 = 144;
 const WAIT_STATES: u8 = 4;
 /// Number of polls of HSERDY in one try: about a second with HSI. The watchdog allows two at least.
 const CLOCK_POLLS: u32 = 1 << 20;
+/// Number of polls of any other flag of RCC: 10 ms at least with HSI.
+const FLAG_POLLS: u32 = 1 << 14;
 /// Number of polls between two changes of the LED: about 60 ms.
 const LED_POLLS: u32 = 1 << 16;
 /// AHB cycles until a new divider of a bus is in force (RM0390, 6.3.3, PPRE1).
@@ -29,17 +31,17 @@ pub(super) fn raise(rcc: &RCC, flash: &FLASH) {
     flash.acr().write(|w| unsafe {
         w.latency().bits(WAIT_STATES).prften().bit(can_prefetch()).icen().set_bit().dcen().set_bit()
     });
-    while rcc.cr().read().pllrdy().bit_is_clear() {}
+    wait(|| rcc.cr().read().pllrdy().bit_is_set());
     rcc.cfgr().modify(|_, w| w.ppre1().div4().ppre2().div2());
     cortex_m::asm::delay(PRESCALER_CYCLES);
     rcc.cfgr().modify(|_, w| w.sw().pll());
-    while !rcc.cfgr().read().sws().is_pll() {}
+    wait(|| rcc.cfgr().read().sws().is_pll());
     watch(rcc);
 }
 
 /// Switches HSE on. The clock of an ST-LINK may come seconds after the supply of the board, so the wait has a bound: the
-/// LED flickers, the try is counted, and the chip is reset for the next one. Without a watchdog reset, the cause of the
-/// start is still the supply.
+/// LED flickers, and the chip is reset for the next try. Without a watchdog reset, the cause of the start is still the
+/// supply.
 fn start_hse(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.hsebyp().bit(HSE_IS_BYPASSED).hseon().set_bit());
     for polls in 1..=CLOCK_POLLS {
@@ -50,6 +52,20 @@ fn start_hse(rcc: &RCC) {
             led::flicker(rcc);
         }
     }
+    try_again()
+}
+
+/// Waits for a flag of RCC, which comes within 300 us (t_LOCK; STM32F446 datasheet, 6.3.11). Without it the chip is reset
+/// for the next try.
+#[inline(never)]
+fn wait(has_come: impl Fn() -> bool) {
+    if !(0..FLAG_POLLS).any(|_| has_come()) {
+        try_again()
+    }
+}
+
+/// Counts the try, and resets the chip for the next one.
+fn try_again() -> ! {
     retained::set_clock_tries(retained::clock_tries().saturating_add(1));
     SCB::sys_reset()
 }
@@ -72,10 +88,10 @@ fn watch(rcc: &RCC) {
 pub(super) fn lower(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.csson().clear_bit());
     rcc.cfgr().modify(|_, w| w.sw().hsi());
-    while !rcc.cfgr().read().sws().is_hsi() {}
+    wait(|| rcc.cfgr().read().sws().is_hsi());
     rcc.cfgr().reset();
     rcc.cr().modify(|_, w| w.pllon().clear_bit().hseon().clear_bit());
-    while rcc.cr().read().pllrdy().bit_is_set() {}
+    wait(|| rcc.cr().read().pllrdy().bit_is_clear());
     rcc.cr().modify(|_, w| w.hsebyp().clear_bit());
     rcc.pllcfgr().reset();
     // SAFETY: the flash driver has done its work. Without an operation under way nobody depends on the wait states and
