@@ -53,6 +53,8 @@ impl Chip {
             return Some(Chip { device: 0x421, flash: 512, bypass: true });
         }
         let is_other = name.starts_with("STM32F405") || name.starts_with("STM32F407");
-        is_other.then_some(Chip { device: 0x413, flash: 1024, bypass: false })
+        // The letter of the flash size: E 512 KiB, G 1 MiB.
+        let flash = if name.chars().nth(10) == Some('E') { 512 } else { 1024 };
+        is_other.then_some(Chip { device: 0x413, flash, bypass: false })
     }
 }

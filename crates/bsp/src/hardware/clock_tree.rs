@@ -4,11 +4,12 @@
 use cortex_m::peripheral::SCB;
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 
-use super::board::HSE_IS_BYPASSED;
-use super::{led, retained};
+use super::gpio::Output;
+use super::retained;
+use crate::boards::{BOARD, Chip};
 
-/// 144 MHz from HSE: 8 MHz / 4 * 144 / 2. APB1 has a quarter of this clock, because the bit rates need it, APB2 a half.
-const DIVIDER_M: u8 = 4;
+/// 144 MHz from HSE: 2 MHz * 144 / 2. APB1 has a quarter of this clock, because the bit rates need it, APB2 a half.
+const DIVIDER_M: u8 = (BOARD.oscillator.hertz / 2_000_000) as u8;
 const MULTIPLIER_N: u16 = 144;
 /// 4 wait states from 120 MHz on at 2.7 V and more (RM0390, table 6), caches and prefetch on.
 const WAIT_STATES: u8 = 4;
@@ -43,13 +44,14 @@ pub(super) fn raise(rcc: &RCC, flash: &FLASH) {
 /// LED flickers, and the chip is reset for the next try. Without a watchdog reset, the cause of the start is still the
 /// supply.
 fn start_hse(rcc: &RCC) {
-    rcc.cr().modify(|_, w| w.hsebyp().bit(HSE_IS_BYPASSED).hseon().set_bit());
+    rcc.cr().modify(|_, w| w.hsebyp().bit(BOARD.oscillator.is_bypassed).hseon().set_bit());
+    let led = Output::new(BOARD.led, rcc);
     for polls in 1..=CLOCK_POLLS {
         if rcc.cr().read().hserdy().bit_is_set() {
             return;
         }
         if polls % LED_POLLS == 0 {
-            led::flicker(rcc);
+            led.toggle();
         }
     }
     try_again()
@@ -75,7 +77,8 @@ fn try_again() -> ! {
 fn can_prefetch() -> bool {
     const REVISION_A: u16 = 0x1000;
     // SAFETY: a read of a constant.
-    cfg!(feature = "stm32f446") || unsafe { (*DBGMCU::ptr()).idcode().read().rev_id().bits() } != REVISION_A
+    matches!(BOARD.chip, Chip::F446)
+        || unsafe { (*DBGMCU::ptr()).idcode().read().rev_id().bits() } != REVISION_A
 }
 
 /// Switches the clock security system on: if HSE fails, the core continues with HSI and NMI is raised (RM0390, 6.2.7).
