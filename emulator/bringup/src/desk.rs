@@ -160,7 +160,10 @@ impl Desk for EmulatedDesk {
                 }
             }
             Action::Input { .. } if self.mistake == Some(Mistake::NoInput) => {}
-            Action::Input { percent: 0 } => self.stimulate("fault", "rail-low:on")?,
+            Action::Input { percent: 0 } => {
+                self.stimulate("fault", "rail-low:on")?;
+                self.run(Duration::from_millis(100));
+            }
             Action::Input { .. } => {
                 self.stimulate("fault", "rail-low:off")?;
                 self.stimulate("fault", "rail-high:on")?;

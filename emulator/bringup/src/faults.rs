@@ -53,10 +53,10 @@ pub const ALL: [Fault; 24] = [
     ),
     fault("the clock on OSC_IN stops", "clock", "oscillator and PLL", Kind::Flags("--fault no-crystal@1.5")),
     fault(
-        "the oscillator is 300 ppm fast",
+        "the oscillator is 1000 ppm fast",
         "clock",
         "clock against that of the adapter",
-        Kind::Flags("--oscillator 300"),
+        Kind::Flags("--oscillator 1000"),
     ),
     fault(
         "the oscillator is 300 ppm slow",
@@ -64,8 +64,8 @@ pub const ALL: [Fault; 24] = [
         "clock against that of the adapter",
         Kind::Flags("--oscillator -300"),
     ),
-    fault("the receive pin is held low", "receive", "PB8", Kind::Board(|world| noise(world, 1.0))),
-    fault("one bit in 500 is wrong on the bus", "bus", "frames at", Kind::Board(|world| noise(world, 0.002))),
+    fault("the receive pin is held low", "receive", "PB8", Kind::Board(hold_receive)),
+    fault("one frame in ten has a wrong bit", "bus", "frames at", Kind::Board(|world| noise(world, 0.1))),
     fault("the bus stays short-circuited", "bus-faults", "an answer", Kind::Desk(Mistake::BusStaysShort)),
     fault(
         "the wire of the transducer is broken",
@@ -150,6 +150,12 @@ fn flip(world: &mut World, address: u32) {
     if machine.read(address, &mut byte).is_ok() {
         let _ = machine.write(address, &[byte[0] ^ 1]);
     }
+}
+
+/// PB8 is tied to ground.
+fn hold_receive(world: &mut World) {
+    let now = world.now();
+    world.machine(0).peripherals_mut().drive('B', 8, Some(false), now);
 }
 
 fn noise(world: &mut World, share: f64) {

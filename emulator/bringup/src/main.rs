@@ -65,7 +65,7 @@ fn run(cli: &Cli) -> Result<report::Result> {
     let chosen: Vec<&Step> = steps::ALL.iter().collect();
     let mut report = Report::default();
     let result = bringup::run::all(&chosen, &mut desk, subject, effort, &mut report, |step, _| {
-        print!("{}", step.text())
+        print!("{}", step.text());
     });
     report.write(&cli.report)?;
     println!("report: {} and {}", cli.report.display(), cli.report.with_extension("html").display());

@@ -91,7 +91,9 @@ impl Peripherals for Stm32f4 {
     }
 
     fn reset(&mut self, power: bool, now: Time) {
-        self.convert(now);
+        if !power {
+            self.convert(now);
+        }
         self.reset_all(power, now);
         self.settle(now);
     }

@@ -63,7 +63,7 @@ fn each_fault_of_the_hardware_is_named() {
 /// A run that was interrupted goes on with the first step that is not green.
 #[test]
 fn a_second_run_goes_on_at_the_step_that_was_red() {
-    let fault = faults::ALL.iter().find(|fault| fault.step == "clock").unwrap();
+    let fault = faults::ALL.iter().find(|fault| fault.name.contains("ppm")).unwrap();
     let chosen: Vec<_> = steps::ALL[..4].iter().collect();
     let mut report = Report::default();
     let mut broken = desk(fault.flags());

@@ -111,6 +111,20 @@ impl Bench<'_> {
             .fold(0, |value, byte| value << 8 | u32::from(*byte)))
     }
 
+    /// Waits for an answer of the node.
+    ///
+    /// # Errors
+    /// None has come in this time.
+    pub fn answers_within(&mut self, time: Duration) -> Result<()> {
+        let end = self.desk.network().now() + time;
+        loop {
+            let answer = self.object(0x1000, 0).map(drop);
+            if answer.is_ok() || self.desk.network().now() >= end {
+                return answer;
+            }
+        }
+    }
+
     /// The value of an object of type REAL32.
     ///
     /// # Errors

@@ -158,7 +158,7 @@ mod tests {
     fn words_of_probe_rs_come_with_and_without_addresses() {
         assert_eq!(words("00000421 deadbeef\n"), [0x421, 0xDEAD_BEEF]);
         assert_eq!(words("e0042000: 0x10000421\ne0042004: 00000007\n"), [0x1000_0421, 7]);
-        assert_eq!(words("no probe"), []);
+        assert_eq!(words("no probe"), [0_u32; 0]);
     }
 
     #[test]

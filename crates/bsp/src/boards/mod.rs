@@ -39,8 +39,9 @@ pub struct Board {
     pub buttons: [Button; 2],
     /// The lamps of a lift's panel.
     pub lamps: [Light; 2],
-    /// A pin that is driven low so that the CAN transceiver runs: STB, RS or S.
-    pub standby: Option<Pin>,
+    /// The pin that puts the CAN transceiver to sleep (STB, RS or S), with the level that does. Without such a pin, one
+    /// that is not connected.
+    pub standby: Light,
 }
 
 /// A chip.
@@ -54,12 +55,12 @@ pub enum Chip {
     F407,
 }
 
-/// A source of the clock at OSC_IN.
+/// A source of the clock at `OSC_IN`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Oscillator {
     /// The frequency in hertz: an even number of megahertz from 4 to 26.
     pub hertz: u32,
-    /// Whether the board feeds a clock into OSC_IN, as the ST-LINK of a NUCLEO does; otherwise it has a crystal.
+    /// Whether the board feeds a clock into `OSC_IN`, as the ST-LINK of a NUCLEO does; otherwise it has a crystal.
     pub is_bypassed: bool,
 }
 
@@ -115,18 +116,14 @@ impl Board {
         let [left, right] = self.lamps;
         let own = self.led.pin.bit(port) | first.pin.bit(port) | second.pin.bit(port);
         let lamps = left.pin.bit(port) | right.pin.bit(port);
-        let standby = match self.standby {
-            Some(pin) => pin.bit(port),
-            None => 0,
-        };
-        own | lamps | standby | fixed(port)
+        own | lamps | self.standby.pin.bit(port) | fixed(port)
     }
 }
 
 /// The pins at a port that are the same on all boards.
 #[must_use]
 pub const fn fixed(port: char) -> u16 {
-    let [mut at, mut pins] = [0, 0];
+    let (mut at, mut pins) = (0, 0);
     while at < FIXED.len() {
         if FIXED[at].0 == port {
             pins |= FIXED[at].1;
@@ -157,22 +154,22 @@ mod tests {
     #[test]
     fn every_pin_of_a_board_has_one_function() {
         for (feature, board) in ALL {
-            let lights = [board.led, board.lamps[0], board.lamps[1]].map(|light| light.pin);
+            let lights = [board.led, board.lamps[0], board.lamps[1], board.standby].map(|light| light.pin);
             let buttons = board.buttons.map(|button| button.pin);
-            let mut taken = Vec::new();
-            for pin in lights.into_iter().chain(buttons).chain(board.standby) {
+            let mut taken = [None; 6];
+            for (place, pin) in lights.into_iter().chain(buttons).enumerate() {
                 assert!(('A'..='H').contains(&pin.port) && pin.number < 16, "{feature}: {pin:?}");
                 assert_eq!(
                     pin.bit(pin.port) & fixed(pin.port),
                     0,
                     "{feature}: {pin:?} belongs to a peripheral"
                 );
-                assert!(!taken.contains(&pin), "{feature}: {pin:?} twice");
-                taken.push(pin);
+                assert!(!taken.contains(&Some(pin)), "{feature}: {pin:?} twice");
+                taken[place] = Some(pin);
             }
             let of_ports: u32 = ('A'..='H').map(|port| board.pins(port).count_ones()).sum();
             let of_all: u32 = ('A'..='H').map(|port| fixed(port).count_ones()).sum();
-            assert_eq!(of_ports, of_all + taken.len() as u32, "{feature}");
+            assert_eq!(of_ports, of_all + 6, "{feature}");
         }
     }
 

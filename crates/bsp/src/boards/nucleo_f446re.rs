@@ -1,4 +1,4 @@
-//! NUCLEO-F446RE (UM1724): the default. The ST-LINK feeds its clock into OSC_IN.
+//! NUCLEO-F446RE (UM1724): the default. The ST-LINK feeds its clock into `OSC_IN`.
 
 use super::{Board, Button, Chip, Light, Oscillator, Pin, Pull};
 
@@ -14,5 +14,5 @@ pub(super) const BOARD: Board = Board {
         Button { pin: Pin::new('C', 10), pull: Pull::Up, pressed: false },
     ],
     lamps: [Light { pin: Pin::new('C', 0), on: true }, Light { pin: Pin::new('C', 1), on: true }],
-    standby: None,
+    standby: Light { pin: Pin::new('B', 12), on: true },
 };

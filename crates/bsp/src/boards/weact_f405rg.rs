@@ -1,4 +1,4 @@
-//! WeAct Studio STM32F405 Core Board V1.0, with a crystal of 8 MHz (the device tree of Zephyr, `weact_stm32f405_core`). Its
+//! `WeAct` Studio STM32F405 Core Board V1.0, with a crystal of 8 MHz (the device tree of Zephyr, `weact_stm32f405_core`). Its
 //! SD slot shares PC10 with button 2: leave it empty.
 
 use super::{Board, Button, Chip, Light, Oscillator, Pin, Pull};
@@ -14,5 +14,5 @@ pub(super) const BOARD: Board = Board {
         Button { pin: Pin::new('C', 10), pull: Pull::Up, pressed: false },
     ],
     lamps: [Light { pin: Pin::new('C', 0), on: true }, Light { pin: Pin::new('C', 1), on: true }],
-    standby: None,
+    standby: Light { pin: Pin::new('B', 12), on: true },
 };

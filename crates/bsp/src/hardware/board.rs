@@ -9,7 +9,6 @@ use super::can::Controller;
 use super::digital::{Buttons, Lamps};
 use super::flash::Flash;
 use super::front_end::FrontEnd;
-use super::gpio::Output;
 use super::led::Led;
 use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
@@ -17,7 +16,6 @@ use super::transmit::Transmitter;
 use super::watchdog::StartUpWatchdog;
 use super::{ParameterFlash, clock_tree, encoder, errata, idle_pins, retained, sampling};
 use crate::backup_copies::BackupState;
-use crate::boards::{BOARD, Light};
 use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
@@ -96,10 +94,6 @@ impl Board {
         let ssi = Ssi::new(absolute, losses, &mut rcc);
         let (backup, backup_state) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
         let (buttons, lamps, led) = (Buttons::new(&rcc), Lamps::new(&rcc), Led::new(&rcc));
-        if let Some(pin) = BOARD.standby {
-            // The level of `off` is low: the transceiver runs.
-            Output::new(Light { pin, on: true }, &rcc);
-        }
         idle_pins::make_analogue(&rcc);
         let parameters = ParameterFlash::new(Flash::new(device.FLASH), losses);
         Board {

@@ -4,8 +4,7 @@
 use cortex_m::peripheral::SCB;
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 
-use super::gpio::Output;
-use super::retained;
+use super::{led, retained};
 use crate::boards::{BOARD, Chip};
 
 /// 144 MHz from HSE: 2 MHz * 144 / 2. APB1 has a quarter of this clock, because the bit rates need it, APB2 a half.
@@ -45,7 +44,7 @@ pub(super) fn raise(rcc: &RCC, flash: &FLASH) {
 /// supply.
 fn start_hse(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.hsebyp().bit(BOARD.oscillator.is_bypassed).hseon().set_bit());
-    let led = Output::new(BOARD.led, rcc);
+    let led = led::Pin::new(rcc);
     for polls in 1..=CLOCK_POLLS {
         if rcc.cr().read().hserdy().bit_is_set() {
             return;

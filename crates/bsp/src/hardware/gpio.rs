@@ -1,8 +1,8 @@
-//! Pins that the board file names: inputs and outputs by port and number.
+//! Pins that the board file names: inputs and outputs by port and number, as types, so that an access is a constant.
 
 use stm32f4xx_hal::pac::{GPIOA, RCC, gpioa};
 
-use crate::boards::{Button, Light, Pin, Pull};
+use crate::boards::Pull;
 
 /// Distance of two ports in bytes (RM0390, table 1).
 const STEP: usize = 0x400;
@@ -12,77 +12,90 @@ pub(super) fn port(letter: char) -> &'static gpioa::RegisterBlock {
     let first: *const gpioa::RegisterBlock = GPIOA::ptr();
     // SAFETY: all ports have the same registers, STEP bytes apart, and the boards have the ports A to H. Each pin is
     // changed by its owner only.
-    unsafe { &*first.byte_add(number(letter) * STEP) }
+    unsafe { &*first.byte_add(place_of(letter) * STEP) }
 }
 
-fn number(letter: char) -> usize {
-    (letter as usize).saturating_sub('A' as usize) & 0x7
+const fn place_of(letter: char) -> usize {
+    (letter as usize - 'A' as usize) & 0x7
 }
 
-/// Switches the clock of the port on, and sets the mode of the pin: 0 input, 1 output.
-fn set_mode(pin: Pin, mode: u32, rcc: &RCC) {
+/// Switches the clock of a port on.
+fn enable(letter: char, rcc: &RCC) {
     // SAFETY: a bit for each port, in the order of the ports.
-    rcc.ahb1enr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << number(pin.port)) });
+    rcc.ahb1enr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << place_of(letter)) });
     let _ = rcc.ahb1enr().read();
-    let place = 2 * u32::from(pin.number);
-    // SAFETY: MODER takes any value.
-    port(pin.port).moder().modify(|r, w| unsafe { w.bits(r.bits() & !(0b11 << place) | mode << place) });
 }
 
-/// An output.
-pub(super) struct Output {
-    port: &'static gpioa::RegisterBlock,
-    light: Light,
+/// Changes the two bits of a pin in a register.
+const fn field(register: u32, pin: u8, value: u32) -> u32 {
+    register & !(0b11 << (2 * pin)) | value << (2 * pin)
 }
 
-impl Output {
+/// An output; `ON` is the level that switches it on.
+pub(super) struct Output<const PORT: char, const PIN: u8, const ON: bool>;
+
+impl<const PORT: char, const PIN: u8, const ON: bool> Output<PORT, PIN, ON> {
     /// The output, off.
-    pub(super) fn new(light: Light, rcc: &RCC) -> Output {
-        let output = Output { port: port(light.pin.port), light };
-        // SAFETY: the clock of the port, so that the level is set before the pin is an output.
-        rcc.ahb1enr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << number(light.pin.port)) });
+    pub(super) fn new(rcc: &RCC) -> Self {
+        enable(PORT, rcc);
+        let output: Self = Output;
         output.set(false);
-        set_mode(light.pin, 1, rcc);
+        // SAFETY: MODER takes any value; 1 is an output.
+        port(PORT).moder().modify(|r, w| unsafe { w.bits(field(r.bits(), PIN, 1)) });
         output
     }
 
     /// Switches it. One store, at any priority.
     pub(super) fn set(&self, on: bool) {
-        let high = on == self.light.on;
-        let place = self.light.pin.number + if high { 0 } else { 16 };
+        let place = if on == ON { PIN } else { PIN + 16 };
         // SAFETY: BSRR takes any value, and changes the pins with a bit only.
-        self.port.bsrr().write(|w| unsafe { w.bits(1 << place) });
+        port(PORT).bsrr().write(|w| unsafe { w.bits(1 << place) });
     }
 
     /// Switches it to the other state.
     pub(super) fn toggle(&self) {
-        let is_high = self.port.odr().read().bits() >> self.light.pin.number & 1 != 0;
-        self.set(is_high != self.light.on);
+        let is_high = port(PORT).odr().read().bits() >> PIN & 1 != 0;
+        self.set(is_high != ON);
     }
 }
 
-/// An input with a button.
-pub(super) struct Input(Button);
+/// An input with a button; `PRESSED` is the level of a pressed button.
+pub(super) struct Input<const PORT: char, const PIN: u8, const PRESSED: bool>;
 
-impl Input {
-    pub(super) fn new(button: Button, rcc: &RCC) -> Input {
-        set_mode(button.pin, 0, rcc);
-        let place = 2 * u32::from(button.pin.number);
-        let pull = match button.pull {
+impl<const PORT: char, const PIN: u8, const PRESSED: bool> Input<PORT, PIN, PRESSED> {
+    pub(super) fn new(pull: Pull, rcc: &RCC) -> Self {
+        enable(PORT, rcc);
+        let resistor = match pull {
             Pull::None => 0,
             Pull::Up => 1,
             Pull::Down => 2,
         };
-        // SAFETY: the values are those of PUPDR.
-        port(button.pin.port)
-            .pupdr()
-            .modify(|r, w| unsafe { w.bits(r.bits() & !(0b11 << place) | pull << place) });
-        Input(button)
+        // SAFETY: the values are those of MODER and PUPDR; 0 is an input.
+        unsafe {
+            port(PORT).moder().modify(|r, w| w.bits(field(r.bits(), PIN, 0)));
+            port(PORT).pupdr().modify(|r, w| w.bits(field(r.bits(), PIN, resistor)));
+        }
+        Input
     }
 
     /// Whether the button is pressed.
     pub(super) fn is_pressed(&self) -> bool {
-        let Button { pin, pressed, .. } = self.0;
-        (port(pin.port).idr().read().bits() >> pin.number & 1 != 0) == pressed
+        (port(PORT).idr().read().bits() >> PIN & 1 != 0) == PRESSED
     }
 }
+
+/// The output of a light of the board.
+macro_rules! output_of {
+    ($light:expr) => {
+        $crate::hardware::gpio::Output<{ $light.pin.port }, { $light.pin.number }, { $light.on }>
+    };
+}
+
+/// The input of a button of the board.
+macro_rules! input_of {
+    ($button:expr) => {
+        $crate::hardware::gpio::Input<{ $button.pin.port }, { $button.pin.number }, { $button.pressed }>
+    };
+}
+
+pub(super) use {input_of, output_of};

@@ -2,15 +2,18 @@
 
 use stm32f4xx_hal::pac::RCC;
 
-use super::gpio::Output;
+use super::gpio::output_of;
 use crate::boards::BOARD;
 
+/// The pin of the LED.
+pub(super) type Pin = output_of!(BOARD.led);
+
 /// The LED.
-pub struct Led(Output);
+pub struct Led(Pin);
 
 impl Led {
     pub(crate) fn new(rcc: &RCC) -> Led {
-        Led(Output::new(BOARD.led, rcc))
+        Led(Pin::new(rcc))
     }
 
     /// Switches the LED.

@@ -7,12 +7,10 @@ use update::Reset;
 
 use super::can::Controller;
 use super::flash::Flash;
-use super::gpio::Output;
 use super::led::Led;
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
 use super::{ProgramFlash, StartUpWatchdog, clock_tree, confinement, crash, errata};
-use crate::boards::{BOARD, Light};
 use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
@@ -76,9 +74,6 @@ impl Rest {
         let (time, [alarm, _]) = time_base::start(self.timer, &mut self.rcc);
         let gpiob = self.port.split(&mut self.rcc);
         let led = Led::new(&self.rcc);
-        if let Some(pin) = BOARD.standby {
-            Output::new(Light { pin, on: true }, &self.rcc);
-        }
         let (can, transmitter) = Controller::new(self.can, gpiob.pb9, gpiob.pb8, losses, &mut self.rcc);
         Bus { time, alarm, can, transmitter, led }
     }

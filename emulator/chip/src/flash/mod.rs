@@ -153,7 +153,7 @@ impl Flash {
 
     /// Whether an operation is under way with a parallelism of 32 bits or more.
     pub(crate) fn works_by_words(&self, now: Time) -> bool {
-        now < self.busy_until && field(self.cr, CR_PSIZE, 2) >= 2
+        now < self.busy_until && field(self.cr, 8, 2) >= 2
     }
 
     /// A reset. A reset in the middle of an erase leaves the sector torn.

@@ -1,8 +1,8 @@
 //! Steps 14 and 15: saves and updates.
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use canopen::nmt::Command;
-use canopen::{CanId, Duration, Frame};
+use canopen::{Duration, Frame};
 use nodectl::nmt;
 use nodectl::sdo;
 use nodectl::update::{Options, Step, Watcher, update as update_nodes};
@@ -39,7 +39,7 @@ pub(super) fn saves(bench: &mut Bench<'_>) -> Result<()> {
 
 /// SYNCs in a row: the receive FIFO of the node is full, and its TPDOs load the bus.
 fn load(bench: &mut Bench<'_>) -> Result<()> {
-    let sync = Frame::new(CanId::SYNC, &[]);
+    let sync = Frame::new(0x080, &[]).context("a SYNC")?;
     (0..20).try_for_each(|_| Ok(bench.desk.network().send(&sync)?))
 }
 

@@ -78,8 +78,8 @@ pub(super) fn watchdog(bench: &mut Bench<'_>) -> Result<()> {
     nmt::send(bench.desk.network(), Command::ResetNode, Some(node))?;
     let start = boot_up(bench)?.0 - before.0;
     bench.set(0x1017, 0, &10_u16.to_le_bytes())?;
-    bench.wait(Duration::from_millis(200))?;
     bench.desk.network().forget();
+    bench.wait(Duration::from_millis(200))?;
     for register in 0..3 {
         bench.desk.write(chip::INTERRUPTS_OFF + 4 * register, u32::MAX)?;
     }

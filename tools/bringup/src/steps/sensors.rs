@@ -49,9 +49,12 @@ pub(super) fn channel(bench: &mut Bench<'_>, number: usize) -> Result<Channel> {
 }
 
 pub(super) fn analogue(bench: &mut Bench<'_>) -> Result<()> {
-    let names =
-        [(PRESSURE, "pressure (PA0)"), (SUPPLY, "supply of the transducer (PA1)"), (REFERENCE, "VREFINT")];
-    for (number, name) in names {
+    let inputs = [
+        (PRESSURE, "pressure (PA0)", (100.0, 4000.0)),
+        (SUPPLY, "supply of the transducer (PA1)", (2000.0, 4095.0)),
+        (REFERENCE, "VREFINT", (1400.0, 1700.0)),
+    ];
+    for (number, name, range) in inputs {
         let found = channel(bench, number)?;
         bench.check_range(
             &format!("noise of {name}"),
@@ -63,7 +66,7 @@ pub(super) fn analogue(bench: &mut Bench<'_>) -> Result<()> {
         bench.check_range(
             &format!("level of {name}"),
             found.mean,
-            (100.0, 4000.0),
+            range,
             "codes",
             "At a rail: a broken or shorted wire, or the divider is missing (docs/board.md, Pressure transducer)",
         );
