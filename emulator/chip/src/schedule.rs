@@ -91,7 +91,11 @@ impl Peripherals for Stm32f4 {
     }
 
     fn reset(&mut self, power: bool, now: Time) {
-        if !power {
+        if power {
+            // Without a supply the watchdog has not run.
+            self.asked = None;
+            self.effects.retain(|effect| *effect != Effect::Reset);
+        } else {
             self.convert(now);
         }
         self.reset_all(power, now);

@@ -3,6 +3,7 @@
 
 use canbus::Time;
 use chip::Loss;
+use object::{Object, ObjectSection, ObjectSymbol};
 use sim::world::World;
 
 use crate::chip_faults::{peek, poke};
@@ -138,4 +139,18 @@ fn no_wait_for_a_register_is_without_a_bound() {
         }
     }
     assert_eq!(unbounded, [""; 0]);
+}
+
+/// The control block of the log lies where the bootloader has nothing, so a debug probe reads on through a reset.
+#[test]
+fn the_log_of_the_application_survives_the_bootloader() {
+    let firmware = std::fs::read(images().join("firmware")).unwrap();
+    let elf = object::File::parse(&*firmware).unwrap();
+    let block = elf.symbols().find(|symbol| symbol.name() == Ok("_SEGGER_RTT")).expect("a log").address();
+    let bootloader = std::fs::read(images().join("bootloader")).unwrap();
+    let elf = object::File::parse(&*bootloader).unwrap();
+    let end = elf.sections().map(|section| section.address() + section.size());
+    // The retained words at the end of RAM belong to both.
+    let end = end.filter(|end| (0x2000_0000..0x2001_FF00).contains(end)).max().unwrap();
+    assert!(block >= end, "the log at {block:#x}, the bootloader up to {end:#x}");
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use bringup::chip::Chip;
-use bringup::real::{RealDesk, check_probe_rs};
+use bringup::real::RealDesk;
 use bringup::report::{self, Report, StepReport};
 use bringup::run::{Effort, Subject};
 use bringup::steps::{self, Step};
@@ -79,7 +79,7 @@ fn run(cli: &Cli) -> Result<report::Result> {
     let chip =
         Chip::named(&cli.board.chip).with_context(|| format!("no images exist for {}", cli.board.chip))?;
     let mut report = if cli.again { Report::default() } else { Report::read(&cli.report)? };
-    check_probe_rs()?;
+    probe::check_version().map_err(anyhow::Error::msg)?;
     let mut desk = desk(cli)?;
     let subject = Subject { node: cli.node, chip, kbit: cli.bit_rate };
     let effort = if cli.short { Effort::SHORT } else { Effort::FULL };

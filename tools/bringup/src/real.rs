@@ -14,10 +14,6 @@ use probe::{Board, line};
 
 use crate::desk::{Action, Desk};
 
-/// The oldest probe-rs: older ones switch the debug port off at the end of each call, and the core then sleeps for most
-/// of the time (probe-rs issue 2851).
-const OLDEST: (u32, u32) = (0, 25);
-
 /// A board at a debug probe and a CAN adapter.
 pub struct RealDesk {
     /// The board, as probe-rs names it.
@@ -52,28 +48,6 @@ fn run(command: &mut Command) -> Result<String> {
     let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it says nothing").to_owned();
     ensure!(output.status.success(), "`{}` failed: {last}", line(command));
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-}
-
-/// Refuses a probe-rs that is too old.
-///
-/// # Errors
-/// It is missing or too old.
-pub fn check_probe_rs() -> Result<()> {
-    let text = run(Command::new("probe-rs").arg("--version"))?;
-    let found = version(&text).with_context(|| format!("`probe-rs --version` says {:?}", text.trim()))?;
-    let (major, minor) = OLDEST;
-    ensure!(
-        found >= OLDEST,
-        "probe-rs {}.{} is too old; {major}.{minor} or newer is needed",
-        found.0,
-        found.1
-    );
-    Ok(())
-}
-
-fn version(text: &str) -> Option<(u32, u32)> {
-    let mut numbers = text.split_whitespace().nth(1)?.split('.');
-    Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
 }
 
 /// The words in the output of `probe-rs read`: each line may begin with an address and a colon.
@@ -159,12 +133,5 @@ mod tests {
         assert_eq!(words("00000421 deadbeef\n"), [0x421, 0xDEAD_BEEF]);
         assert_eq!(words("e0042000: 0x10000421\ne0042004: 00000007\n"), [0x1000_0421, 7]);
         assert_eq!(words("no probe"), [0_u32; 0]);
-    }
-
-    #[test]
-    fn an_old_probe_rs_is_told_from_a_new_one() {
-        assert_eq!(version("probe-rs 0.29.1 (git commit: abc)"), Some((0, 29)));
-        assert!(version("probe-rs 0.24.0").unwrap() < OLDEST && version("probe-rs 1.0.0").unwrap() > OLDEST);
-        assert_eq!(version("something"), None);
     }
 }
