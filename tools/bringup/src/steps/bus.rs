@@ -160,7 +160,7 @@ pub(super) fn short_circuit(bench: &mut Bench<'_>) -> Result<()> {
     let answer = bench.answers_within(LONGEST_BACK_OFF);
     bench.check(
         "an answer after the short circuit",
-        answer.as_ref().map_or_else(|error| format!("{error:#}"), |_| "yes".into()),
+        answer.as_ref().map_or_else(|error| format!("{error:#}"), |()| "yes".into()),
         "yes",
         answer.is_ok(),
         "The node does not return from bus-off: read the log",
