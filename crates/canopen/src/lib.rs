@@ -8,6 +8,7 @@
     warn(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+mod array;
 mod can_id;
 pub mod client;
 mod copy;
@@ -33,7 +34,7 @@ mod transmit;
 
 pub use can_id::{CanId, CobId};
 pub use device::{
-    Action, Application, BusEvent, Device, ErrorClass, Job, Next, Node, Part, ServiceDevice, Soundness,
+    Action, Application, BusEvent, Definition, Device, ErrorClass, Job, Next, Part, ServiceDevice, Soundness,
     Stored,
 };
 pub use emcy::{Condition, Fault};
@@ -41,3 +42,11 @@ pub use frame::Frame;
 pub use node_id::NodeId;
 pub use time::{Duration, Instant};
 pub use transmit::{QueueFull, Transmit};
+
+/// What the macros name; not for other use.
+#[doc(hidden)]
+pub mod plumbing {
+    pub use crate::array::Array;
+    pub use crate::device::Rows;
+    pub use crate::heartbeat::Monitored;
+}

@@ -63,7 +63,7 @@ pub trait Transmit {
 
 /// One call of the device: its time and the transmit queue. While the bit rate changes, the queue is closed: it accepts
 /// no frame, and the senders try again later.
-pub struct Context<'a, T> {
+pub(crate) struct Context<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
@@ -92,7 +92,7 @@ impl<T: Transmit> Context<'_, T> {
 }
 
 /// One call of the device for its process data, which have a share of the bus.
-pub struct ProcessContext<'a, T> {
+pub(crate) struct ProcessContext<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,

@@ -1,8 +1,7 @@
 //! The heartbeats of other nodes: object 1016h, and the reaction to a missing heartbeat.
 
-use super::Application;
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::heartbeat::{Change, Watch};
@@ -11,25 +10,16 @@ use crate::{Frame, Instant};
 
 const CONSUMER_TIME: u16 = 0x1016;
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     #[inline(never)]
     pub(super) fn take_heartbeat(&mut self, frame: &Frame, now: Instant) {
-        if self.basic().is_initialising() {
+        if self.is_initialising() {
             return;
         }
         if let Some(change) = self.watches.take(frame, now) {
             self.on_watch(change, now);
         }
-        self.basic.services_due = self.basic.services_due.min(self.watches.due());
+        self.services_due = self.services_due.min(self.watches.due());
     }
 
     pub(super) fn on_watch(&mut self, change: Change, now: Instant) {
@@ -40,7 +30,7 @@ impl<
     }
 
     /// Checks a value of 1016h: bits 24..31 are reserved, and a node can be monitored only once.
-    pub(super) fn admit_watch(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+    pub(super) fn check_watch(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         if value >> 24 != 0 {
             return Err(Abort::InvalidValue);
         }
@@ -51,7 +41,7 @@ impl<
     }
 
     fn watch(&self, sub: u8) -> Option<Watch> {
-        Watch::parse(self.basic().number(CONSUMER_TIME, sub))
+        Watch::parse(self.number(CONSUMER_TIME, sub))
     }
 
     /// Configures the monitoring of a node, and clears its fault.
@@ -63,7 +53,7 @@ impl<
     }
 
     pub(super) fn configure_watches(&mut self, now: Instant) {
-        for sub in (1..=u8::MAX).take(W) {
+        for sub in (1..=u8::MAX).take(self.watches.len()) {
             self.configure_watch(sub, now);
         }
     }

@@ -1,5 +1,6 @@
 //! The heartbeat consumer (CiA 301, 7.2.8.2.2.2): monitors the heartbeats of other nodes.
 
+use crate::array::Array;
 use crate::{CanId, Duration, Frame, Instant, NodeId};
 
 /// An entry of 1016h: a node, and the longest time between two of its heartbeats.
@@ -33,40 +34,51 @@ pub(crate) enum Change {
     Back(u8),
 }
 
+/// A monitored node, or an unused entry.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+pub struct Monitored {
     watch: Option<Watch>,
     /// When the heartbeat is missing. `NEVER` until the first heartbeat, and while the heartbeat is lost.
     due: Instant,
     is_lost: bool,
 }
 
-/// Monitors up to `W` nodes. The monitoring of a node begins with its first heartbeat.
-#[derive(Debug)]
-pub(crate) struct Consumer<const W: usize> {
-    entries: [Entry; W],
+impl Monitored {
+    const fn new(watch: Option<Watch>) -> Monitored {
+        Monitored { watch, due: Instant::NEVER, is_lost: false }
+    }
 }
 
-impl<const W: usize> Consumer<W> {
-    pub(crate) const fn new() -> Consumer<W> {
-        let unused = Entry { watch: None, due: Instant::NEVER, is_lost: false };
-        Consumer { entries: [unused; W] }
+/// Monitors nodes, as many as `E` has elements. The monitoring of a node begins with its first heartbeat.
+#[derive(Debug)]
+pub(crate) struct Consumer<E> {
+    entries: E,
+}
+
+impl<E: Array<Monitored>> Consumer<E> {
+    pub(crate) fn new() -> Consumer<E> {
+        Consumer { entries: E::filled(|| Monitored::new(None)) }
     }
 
     /// Sets an entry of 1016h, from 0, and restarts its monitoring. Returns whether the old node of the entry was lost.
     pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) -> bool {
-        let fresh = Entry { watch, due: Instant::NEVER, is_lost: false };
-        self.entries.get_mut(number).is_some_and(|entry| core::mem::replace(entry, fresh).is_lost)
+        let entry = self.entries.as_mut().get_mut(number);
+        entry.is_some_and(|entry| core::mem::replace(entry, Monitored::new(watch)).is_lost)
+    }
+
+    /// How many nodes can be monitored.
+    pub(crate) fn len(&self) -> usize {
+        self.entries.as_ref().len()
     }
 
     /// CAN-IDs of the monitored heartbeats.
     pub(crate) fn ids(&self) -> impl Iterator<Item = CanId> {
-        self.entries.iter().filter_map(|entry| entry.watch.map(Watch::id))
+        self.entries.as_ref().iter().filter_map(|entry| entry.watch.map(Watch::id))
     }
 
     /// The monitored nodes, entry by entry.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = Option<NodeId>> {
-        self.entries.iter().map(|entry| entry.watch.map(|watch| watch.node))
+        self.entries.as_ref().iter().map(|entry| entry.watch.map(|watch| watch.node))
     }
 
     /// Takes a heartbeat or a boot-up message.
@@ -74,7 +86,7 @@ impl<const W: usize> Consumer<W> {
         if frame.len() != 1 || frame.is_remote() {
             return None;
         }
-        for (number, entry) in (0..).zip(&mut self.entries) {
+        for (number, entry) in (0..).zip(self.entries.as_mut()) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
                 entry.due = now.plus(Duration::from_millis(watch.period.into()));
                 return core::mem::take(&mut entry.is_lost).then_some(Change::Back(number));
@@ -85,17 +97,17 @@ impl<const W: usize> Consumer<W> {
 
     /// The entries whose heartbeat is lost, from 0.
     pub(crate) fn lost(&self) -> impl Iterator<Item = u8> {
-        (0..).zip(&self.entries).filter(|(_, entry)| entry.is_lost).map(|(number, _)| number)
+        (0..).zip(self.entries.as_ref()).filter(|(_, entry)| entry.is_lost).map(|(number, _)| number)
     }
 
     /// The next instant at which a heartbeat is missing.
     pub(crate) fn due(&self) -> Instant {
-        self.entries.iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
+        self.entries.as_ref().iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
     }
 
     /// Reports one missing heartbeat. Must be called until the result is `None`.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
-        let (number, entry) = (0..).zip(&mut self.entries).find(|(_, entry)| now >= entry.due)?;
+        let (number, entry) = (0..).zip(self.entries.as_mut()).find(|(_, entry)| now >= entry.due)?;
         (entry.due, entry.is_lost) = (Instant::NEVER, true);
         Some(Change::Lost(number))
     }

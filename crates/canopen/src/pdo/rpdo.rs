@@ -76,7 +76,7 @@ impl RpdoFault {
 
 /// An RPDO. Only valid RPDOs are in the chains.
 #[derive(Debug)]
-pub(crate) struct Rpdo {
+pub struct Rpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
     /// Index of the communication parameter.

@@ -54,7 +54,7 @@ fn operational<A: Application>(application: A) -> (Lean<A>, Sent) {
 
 #[test]
 fn the_rows_decide_on_the_services() {
-    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::NONE, 0));
+    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::FAULTS, 0));
     assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (Services::ALL, 2));
 }
 
