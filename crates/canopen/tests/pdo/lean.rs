@@ -55,7 +55,13 @@ fn operational<A: Application>(application: A) -> (Lean<A>, Sent) {
 #[test]
 fn the_rows_decide_on_the_services() {
     assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::FAULTS, 0));
-    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (Services::ALL, 2));
+    let multiplexed =
+        [Services::FAULTS, Services::SYNC, Services::EMCY, Services::STORE, Services::MULTIPLEXED_RPDO];
+    let expected = multiplexed.into_iter().fold(Services::NONE, Services::with);
+    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (expected, 2));
+    let other = [Services::of(&[objects::start_up()]), Services::of(&[objects::program_control()[1]])];
+    let expected = [Services::SELF_START, Services::PROGRAM_CONTROL].map(|own| own.with(Services::FAULTS));
+    assert_eq!(other, expected);
 }
 
 #[test]
