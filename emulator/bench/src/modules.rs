@@ -34,17 +34,20 @@ fn by_module(image: &Path) -> Result<BTreeMap<String, u64>> {
     let text = elf.section_by_name(".text").ok_or_else(|| anyhow!("no code in {}", image.display()))?;
     let mut modules = BTreeMap::new();
     for address in (text.address()..text.address() + text.size()).step_by(2) {
-        let frame = loader.find_frames(address).ok().and_then(|mut frames| frames.next().ok().flatten());
-        let file = frame.and_then(|frame| frame.location).and_then(|location| location.file);
-        *modules.entry(module(file.unwrap_or_default())).or_default() += 2;
+        *modules.entry(module(&loader, address)).or_default() += 2;
     }
     Ok(modules)
 }
 
-/// The module of a source file: its path in the library.
-fn module(file: &str) -> String {
-    match file.split_once("canopen/src/") {
-        Some((_, path)) => path.trim_end_matches(".rs").trim_end_matches("/mod").into(),
-        None => "other crates".into(),
+/// The innermost module of the library at an address. Code of the standard library counts as that of its caller, if it
+/// is inlined.
+fn module(loader: &Loader, address: u64) -> String {
+    let mut frames = loader.find_frames(address).ok();
+    while let Some(frame) = frames.as_mut().and_then(|frames| frames.next().ok().flatten()) {
+        let file = frame.location.and_then(|location| location.file).unwrap_or_default();
+        if let Some((_, path)) = file.split_once("canopen/src/") {
+            return path.trim_end_matches(".rs").trim_end_matches("/mod").into();
+        }
     }
+    "other crates".into()
 }

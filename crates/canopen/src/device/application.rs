@@ -20,6 +20,13 @@ pub trait Application {
     /// uploads in segments.
     const BLOCK_UPLOAD: bool = true;
 
+    /// Whether clients may download in blocks (CiA 301, 7.2.4.3.9, optional). Otherwise the request is refused with
+    /// [`Abort::Command`], and the client downloads in segments.
+    const BLOCK_DOWNLOAD: bool = true;
+
+    /// Whether the device has an LSS slave (CiA 305, optional). Without one, the device needs a node-ID from its caller.
+    const LSS: bool = true;
+
     /// The bits of the error register (1001h) that the device supports. Bit 0, the generic error, must be one of them
     /// (CiA 301, 7.5.2.2).
     fn register_bits(&self) -> u8 {

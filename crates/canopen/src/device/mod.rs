@@ -44,7 +44,7 @@ use services::Services;
 /// do not work.
 #[repr(C)] // The services are short. At the start of the structure, an instruction reaches their fields directly.
 pub struct Device<D: Definition> {
-    services: Services,
+    services: Services<D>,
     inner: Inner<D>,
 }
 

@@ -12,6 +12,7 @@ use crate::{Instant, emcy, sync};
 
 impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
+    const BLOCK_DOWNLOAD: bool = D::Application::BLOCK_DOWNLOAD;
 
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;

@@ -16,9 +16,8 @@ const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
 
 /// The SDO server and the LSS slave of a device, with the responses that wait for room in the queue.
-#[derive(Debug)]
-pub(super) struct Services {
-    server: Server,
+pub(super) struct Services<D: Definition> {
+    server: Server<Inner<D>>,
     /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is not a
     /// request.
     sdo_request: FullFrameId,
@@ -31,8 +30,8 @@ pub(super) struct Services {
     budget: Budget,
 }
 
-impl Services {
-    pub(super) fn new(node_id: Option<NodeId>) -> Services {
+impl<D: Definition> Services<D> {
+    pub(super) fn new(node_id: Option<NodeId>) -> Services<D> {
         Services {
             server: Server::new(),
             sdo_request: sdo_request(node_id),
@@ -56,7 +55,9 @@ impl Services {
     /// Resets the services. Returns the node-ID with which the device starts.
     pub(super) fn restart(&mut self) -> Option<NodeId> {
         self.forget_transfer();
-        self.lss.restart();
+        if D::Application::LSS {
+            self.lss.restart();
+        }
         self.sdo_request = sdo_request(self.lss.node_id());
         self.lss.node_id()
     }
@@ -75,7 +76,7 @@ impl Services {
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
     pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
-        Context { now, out, is_open: !self.lss.is_switching() }
+        Context { now, out, is_open: !(D::Application::LSS && self.lss.is_switching()) }
     }
 
     /// The same for process data, which have a share of the bus.
@@ -85,7 +86,12 @@ impl Services {
         out: &'a mut Q,
     ) -> ProcessContext<'a, Q> {
         self.budget.begin(now, || out.has_waiting_pdo());
-        ProcessContext { now, out, is_open: !self.lss.is_switching(), budget: &mut self.budget }
+        ProcessContext {
+            now,
+            out,
+            is_open: !(D::Application::LSS && self.lss.is_switching()),
+            budget: &mut self.budget,
+        }
     }
 }
 
@@ -125,7 +131,8 @@ impl<D: Definition> Device<D> {
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).
     pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
         let sdo = self.inner.node_id.map(|own| own.service(SDO_REQUEST));
-        [lss::REQUEST].into_iter().chain(sdo).chain(self.inner.watches.ids())
+        let lss = D::Application::LSS.then_some(lss::REQUEST);
+        lss.into_iter().chain(sdo).chain(self.inner.watches.ids())
     }
 
     /// Takes a request to the SDO server.
@@ -141,7 +148,7 @@ impl<D: Definition> Device<D> {
     /// Takes a frame that is no request to the SDO server: LSS, or the heartbeat of another node.
     #[inline(never)]
     pub(super) fn take_other_service(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        if frame.id() == lss::REQUEST.get() {
+        if D::Application::LSS && frame.id() == lss::REQUEST.get() {
             let context = &mut self.services.context(now, out);
             self.services.lss.take_frame(frame, context, &mut self.inner);
         } else if Inner::<D>::has(crate::dictionary::Services::HEARTBEAT_CONSUMER)
@@ -219,7 +226,7 @@ impl<D: Definition> Device<D> {
         lss_waits: bool,
         context: &mut Context<'_, impl Transmit>,
     ) {
-        if lss_waits {
+        if D::Application::LSS && lss_waits {
             self.services.lss.respond(lss::Slave::stored(result.is_ok()), context);
         }
         if self.services.server.release(result, context.now) {
@@ -237,11 +244,15 @@ impl<D: Definition> Device<D> {
 
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
-        if let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner) {
+        if D::Application::LSS
+            && let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner)
+        {
             self.services.set_bus_bit_rate(bit_rate);
         }
         let context = &mut self.services.context(now, out);
-        self.services.lss.poll(context);
+        if D::Application::LSS {
+            self.services.lss.poll(context);
+        }
         if !self.inner.is_initialising() {
             // Nothing precedes the boot-up message. Any other heartbeat follows the EMCY that gives the reason for a new
             // state.
@@ -277,7 +288,7 @@ impl<D: Definition> Device<D> {
 
     fn next_service(&self) -> Instant {
         let (services, inner) = (&self.services, &self.inner);
-        let lss = services.lss.due();
+        let lss = if D::Application::LSS { services.lss.due() } else { Instant::NEVER };
         if inner.is_initialising() {
             return lss;
         }

@@ -22,6 +22,8 @@ pub(crate) enum Writable {
 pub(crate) trait Objects {
     /// Whether block uploads are supported.
     const BLOCK_UPLOAD: bool;
+    /// Whether block downloads are supported.
+    const BLOCK_DOWNLOAD: bool;
 
     /// The value of an entry.
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
