@@ -222,9 +222,7 @@ impl<D: Definition> Inner<D> {
     /// Sends the process data that is due.
     #[inline]
     pub(super) fn send_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
-        if !Self::has_pdos() {
-            self.process_due = Instant::NEVER;
-        } else if context.now >= self.process_due {
+        if context.now >= self.process_due {
             self.run_process(context);
         }
     }

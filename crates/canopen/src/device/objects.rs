@@ -62,7 +62,7 @@ impl<D: Definition> Objects for Inner<D> {
     }
 
     fn take_deferred(&mut self) -> bool {
-        self.jobs.take_deferred()
+        Self::has(Services::FAULTS) && self.jobs.take_deferred()
     }
 
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
@@ -92,7 +92,10 @@ impl<D: Definition> Inner<D> {
             entry.field.set(self.image.as_mut(), bytes);
         }
         self.apply(entry, value, now);
-        (self.process_due, self.services_due) = (STALE, STALE);
+        self.services_due = STALE;
+        if Self::has_pdos() {
+            self.process_due = STALE;
+        }
         Ok(())
     }
 

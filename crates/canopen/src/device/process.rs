@@ -43,8 +43,11 @@ impl<D: Definition> Device<D> {
         if is_nmt {
             self.on_nmt(frame);
         }
+        if !Inner::<D>::has_pdos() {
+            return;
+        }
         let context = &mut self.services.process_context(now, out);
-        if !is_nmt && Inner::<D>::has_pdos() && self.inner.state.has_pdos() {
+        if !is_nmt && self.inner.state.has_pdos() {
             self.inner.take_pdo_frame(frame, context);
         }
         self.inner.send_process(context);
@@ -60,15 +63,13 @@ impl<D: Definition> Device<D> {
     /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if now >= self.inner.process_due {
+        if Inner::<D>::has_pdos() && now >= self.inner.process_due {
             let context = &mut self.services.process_context(now, out);
             self.inner.send_process(context);
         }
         self.process_next()
     }
-}
 
-impl<D: Definition> Device<D> {
     /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
     /// starts by itself (1F80h), the first `publish` after a start makes the device operational.
     pub fn publish(

@@ -49,7 +49,9 @@ impl<D: Definition> Services<D> {
 
     /// Sets the bit rate at which the bus runs.
     pub(super) fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
-        self.budget.set_bit_rate(bit_rate.kbit());
+        if Inner::<D>::has_pdos() {
+            self.budget.set_bit_rate(bit_rate.kbit());
+        }
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.
