@@ -34,12 +34,12 @@ mod transmit;
 
 pub use can_id::{CanId, CobId};
 pub use device::{
-    Action, Application, BusEvent, Definition, Device, ErrorClass, Job, Next, Part, ServiceDevice, Soundness,
-    Stored,
+    Action, Application, BusEvent, Definition, Device, Job, Next, ServiceDevice, Soundness, Stored,
 };
-pub use emcy::{Condition, Fault};
+pub use emcy::{Condition, ErrorClass, Fault};
 pub use frame::Frame;
 pub use node_id::NodeId;
+pub use sdo::Part;
 pub use time::{Duration, Instant};
 pub use transmit::{QueueFull, Transmit};
 

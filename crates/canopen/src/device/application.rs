@@ -2,9 +2,9 @@
 
 use super::{Soundness, Stored};
 use crate::dictionary::{Entry, Group, Groups};
-use crate::emcy::{Condition, Fault};
+use crate::emcy::{Condition, ErrorClass, Fault};
 use crate::nmt::State;
-use crate::sdo::{Abort, Multiplexer};
+use crate::sdo::{Abort, Multiplexer, Part};
 
 /// The application code of a product: the behaviour behind the objects. Every method has a default that does nothing,
 /// so an application implements only the methods that it needs.
@@ -161,25 +161,3 @@ pub trait Application {
 
 /// An application without behaviour: the device holds values only.
 impl Application for () {}
-
-/// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ErrorClass(pub u8);
-
-impl ErrorClass {
-    /// Communication errors, sub-index 1.
-    pub const COMMUNICATION: ErrorClass = ErrorClass(1);
-    /// Errors of the device itself: sub-index 2, the first sub-index for a device profile or the manufacturer.
-    pub const DEVICE: ErrorClass = ErrorClass(2);
-}
-
-/// A part of a download to a domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part<'a> {
-    /// The download begins. The number of bytes, if the client announces it.
-    Begin(Option<usize>),
-    /// Some bytes, and the offset of the first one in the domain.
-    Data(usize, &'a [u8]),
-    /// The download is complete, with this number of bytes.
-    End(usize),
-}

@@ -3,8 +3,7 @@
 use super::Definition;
 use super::inner::Inner;
 use super::{Application, STALE};
-use crate::pdo::Chain;
-use crate::transmit::ProcessContext;
+use crate::pdo::{Chain, ProcessContext};
 use crate::{Instant, Transmit};
 
 impl<D: Definition> Inner<D> {

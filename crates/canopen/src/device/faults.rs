@@ -2,10 +2,10 @@
 
 use super::Definition;
 use super::inner::Inner;
-use super::{Application, Device, ErrorClass, Next, STALE};
+use super::{Application, Device, Next, STALE};
 use crate::Instant;
 use crate::dictionary::Services;
-use crate::emcy::Fault;
+use crate::emcy::{ErrorClass, Fault};
 use crate::nmt::State;
 
 /// Error behaviour.

@@ -8,8 +8,8 @@ use crate::array::Array;
 use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
 use crate::lss::Identity;
 use crate::nmt::State;
-use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
-use crate::transmit::{Context, ProcessContext};
+use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
+use crate::transmit::Context;
 use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync};
 
 /// Identity object.

@@ -27,7 +27,7 @@ mod store;
 mod syncs;
 mod watches;
 
-pub use application::{Application, ErrorClass, Part};
+pub use application::Application;
 pub use definition::{Definition, Rows};
 pub use faults::BusEvent;
 pub use next::{Action, Next};

@@ -5,9 +5,9 @@ use super::inner::Inner;
 use super::pdos::low_half;
 use super::state::SELF_START;
 use super::store::{check_program_control, command};
-use super::{Application, Part, STALE};
+use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
-use crate::sdo::{Abort, Multiplexer, Objects, Writable};
+use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
 use crate::{Instant, emcy, sync};
 
 impl<D: Definition> Objects for Inner<D> {

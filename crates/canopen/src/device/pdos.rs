@@ -8,10 +8,10 @@ use super::Application;
 use super::Definition;
 use super::inner::Inner;
 use super::rpdos::filter_bit;
-use crate::dictionary::{Dictionary, Entry, Rule, Services};
+use crate::dictionary::{Dictionary, Direction, Entry, Rule, Services};
 use crate::pdo::{
-    Addressing, Chain, Content, Direction, Layout, Links, MappedObject, RpdoSettings, ScannerSettings,
-    Settings, Transmission, locate,
+    Addressing, Chain, Content, Layout, Links, MappedObject, RpdoSettings, ScannerSettings, Settings,
+    Transmission, locate,
 };
 use crate::sdo::Abort;
 use crate::{CobId, Instant};

@@ -5,8 +5,7 @@ use super::inner::Inner;
 use super::{Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::nmt::Command;
-use crate::pdo::{Chain, Rpdo, Tpdo};
-use crate::transmit::ProcessContext;
+use crate::pdo::{Chain, ProcessContext, Rpdo, Tpdo};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 impl<D: Definition> Device<D> {

@@ -5,9 +5,9 @@ use super::lss::LssSlave;
 use super::{Application as _, Definition, Device, Next, STALE};
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
-use crate::pdo::Budget;
+use crate::pdo::{Budget, ProcessContext};
 use crate::sdo::{Abort, Server};
-use crate::transmit::{Context, ProcessContext, RETRY};
+use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).

@@ -6,7 +6,7 @@ use super::pdos::low_half;
 use super::{Action, Application, Device, Job, Next, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
-use crate::transmit::ProcessContext;
+use crate::pdo::ProcessContext;
 use crate::{Instant, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.

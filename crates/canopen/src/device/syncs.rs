@@ -4,9 +4,8 @@ use super::Definition;
 use super::inner::Inner;
 use super::{Application, STALE};
 use crate::emcy::Fault;
-use crate::pdo::Chain;
+use crate::pdo::{Chain, ProcessContext};
 use crate::sync::Settings;
-use crate::transmit::ProcessContext;
 use crate::{Frame, Instant, Transmit};
 
 impl<D: Definition> Inner<D> {

@@ -1,6 +1,5 @@
 //! Faults: communication faults, which the device detects itself, and faults of the application.
 
-use crate::ErrorClass;
 use crate::dictionary::Group;
 
 /// A fault that the device signals by EMCY.
@@ -65,6 +64,17 @@ impl Condition {
         self.class = Some(class);
         self
     }
+}
+
+/// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorClass(pub u8);
+
+impl ErrorClass {
+    /// Communication errors, sub-index 1.
+    pub const COMMUNICATION: ErrorClass = ErrorClass(1);
+    /// Errors of the device itself: sub-index 2, the first sub-index for a device profile or the manufacturer.
+    pub const DEVICE: ErrorClass = ErrorClass(2);
 }
 
 /// First byte of the error field of an EMCY about stored data: the values that are in use instead.

@@ -1,10 +1,10 @@
 //! The EMCY producer: keeps the set of active faults, sends their changes, and keeps the list of the errors sent.
 
 use super::history::History;
-use super::{Condition, Fault, FaultSet, Message};
+use super::{Condition, ErrorClass, Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::{Context, RETRY};
-use crate::{CobId, Duration, ErrorClass, Frame, Instant, Transmit};
+use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest

@@ -5,11 +5,11 @@
 //! triggers the transmission, always of all objects. Without one, each changed object is sent. Entering Operational
 //! sends all objects in both cases.
 
-use super::{Address, Addressing, Layout, Mpdo};
+use super::{Address, Layout, Mpdo, ProcessContext};
 use crate::array::Array;
-use crate::dictionary::Field;
+use crate::dictionary::{Addressing, Field};
 use crate::sdo::Multiplexer;
-use crate::transmit::{ProcessContext, RETRY};
+use crate::transmit::RETRY;
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 
 /// Settings of the multiplexed TPDO, from the dictionary.

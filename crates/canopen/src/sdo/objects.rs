@@ -2,12 +2,23 @@
 //! a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
+use crate::Instant;
 use crate::copy::copy;
-use crate::{Instant, Part};
 
 /// Size of the buffer in bytes: the longest value, and the longest part of a stream. A multiple of a segment (7), and
 /// of a word (4) for the CRC and for copies.
 pub(crate) const BUFFER: usize = 112;
+
+/// A part of a download to a domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part<'a> {
+    /// The download begins. The number of bytes, if the client announces it.
+    Begin(Option<usize>),
+    /// Some bytes, and the offset of the first one in the domain.
+    Data(usize, &'a [u8]),
+    /// The download is complete, with this number of bytes.
+    End(usize),
+}
 
 /// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
