@@ -38,13 +38,19 @@ pub trait Application {
     fn initialise(&mut self, _image: &mut [u8]) {}
 
     /// Decides on a write to an entry that is [`handled`](crate::dictionary::Object::handled), by SDO or by an RPDO.
-    /// Type and limits are checked already, and the device stores the bytes. The method may change other values, and
-    /// bit 31 of the COB-ID of a PDO: after a write by SDO, the device switches the PDO on or off accordingly.
+    /// Type and limits are checked already, and the device stores the bytes. The method may change other values.
     ///
     /// # Errors
     /// The reason to refuse the write; nothing is stored then.
     fn write(&mut self, _entry: &Entry, _bytes: &[u8], _image: &mut [u8]) -> Result<(), Abort> {
         Ok(())
+    }
+
+    /// Whether a write to this [`handled`](crate::dictionary::Object::handled) entry can change bit 31 of the COB-ID of a
+    /// PDO, or the result of [`broadcasts`](Application::broadcasts). After such a write by SDO, the device switches its
+    /// PDOs on or off accordingly. This takes time in proportion to the number of PDOs.
+    fn switches_pdos(&self, _entry: &Entry) -> bool {
+        false
     }
 
     /// An SDO client has written this entry.
@@ -116,7 +122,7 @@ pub trait Application {
 
     /// Whether a multiplexed TPDO in destination address mode sends this object to all nodes. An application returns
     /// `false` for the objects of a device part that is not installed. Called whenever the TPDO is configured, and
-    /// after a write to an entry that is [`handled`](crate::dictionary::Object::handled).
+    /// after a write to an entry with [`switches_pdos`](Application::switches_pdos).
     fn broadcasts(&self, _at: Multiplexer, _image: &[u8]) -> bool {
         true
     }

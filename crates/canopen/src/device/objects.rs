@@ -52,6 +52,7 @@ impl<D: Definition> Objects for Inner<D> {
         let job = self.job_of(entry)?;
         match entry.rule() {
             Rule::Plain => entry.field.set_number(self.image.as_mut(), value, bytes),
+            Rule::Application => self.write_handled(entry, bytes, now)?,
             _ => self.write_by_rule(entry, value, bytes, now)?,
         }
         if entry.is_parameter() {
@@ -78,16 +79,24 @@ impl<D: Definition> Inner<D> {
         self.application.write_domain(at, Part::End(bytes.len()))
     }
 
+    /// Writes an entry whose values the application accepts or refuses.
+    fn write_handled(&mut self, entry: &Entry, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+        self.application.write(entry, bytes, self.image.as_mut())?;
+        entry.field.set(self.image.as_mut(), bytes);
+        self.pending.parameters_changed();
+        if Self::has_pdos() && self.application.switches_pdos(entry) {
+            self.apply_application_changes(now);
+            (self.process_due, self.services_due) = (STALE, STALE);
+        }
+        Ok(())
+    }
+
     /// Writes an entry whose rule does more than storing a value: everything that can refuse the value comes before
     /// any effect.
     #[inline(never)]
     fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Instant) -> Result<(), Abort> {
         let rule = entry.rule();
         self.check(entry, value)?;
-        if rule == Rule::Application {
-            self.application.write(entry, bytes, self.image.as_mut())?;
-            self.pending.parameters_changed();
-        }
         if !rule.is_computed() && !rule.is_command() {
             entry.field.set(self.image.as_mut(), bytes);
         }
@@ -154,7 +163,6 @@ impl<D: Definition> Inner<D> {
     fn apply(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
-            Rule::Application if Self::has_pdos() => self.apply_application_changes(now),
             Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow
                 if Self::has(Services::SYNC) =>
