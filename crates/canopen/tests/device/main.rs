@@ -24,4 +24,5 @@ mod store;
 mod store_at_once;
 mod sync;
 mod tpdo;
+mod types;
 mod wrong_tables;
