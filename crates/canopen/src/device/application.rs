@@ -15,6 +15,10 @@ pub trait Application {
     /// The faults of the application, at most 32. [`Fault::Application`] names a fault by its position in this list.
     const CONDITIONS: &'static [Condition] = &[];
 
+    /// Whether the upper half of an entry of 1003h has the first two bytes of the error field of its EMCY. Otherwise it
+    /// is 0.
+    const LISTS_DETAIL: bool = false;
+
     /// Whether clients may upload in blocks (CiA 301, 7.2.4.3.12, optional). A device that is short of flash and has no
     /// long entry can switch block uploads off: the request is then refused with [`Abort::Command`], and the client
     /// uploads in segments.
@@ -66,6 +70,13 @@ pub trait Application {
 
     /// The NMT state has changed.
     fn state(&mut self, _state: State, _image: &mut [u8]) {}
+
+    /// The error field of the EMCY of a fault of the application, by its number in
+    /// [`CONDITIONS`](Application::CONDITIONS): for example the channel and its value. `None` for the error field of the
+    /// condition. Called for each EMCY of the fault: when it occurs, and when it is reported again after a reset.
+    fn fault_detail(&self, _number: u8) -> Option<[u8; 5]> {
+        None
+    }
 
     /// A fault has occurred (`active`) or is over.
     fn fault(&mut self, _fault: Fault, _active: bool, _image: &mut [u8]) {}

@@ -94,7 +94,8 @@ impl<D: Definition> Inner<D> {
     /// After a reset: reports the faults that are still active, and the groups that could not be loaded.
     pub(super) fn configure_faults(&mut self, now: Instant) {
         if Self::has(Services::EMCY) {
-            self.emcy.restart(now);
+            let application = &self.application;
+            self.emcy.restart(|number| application.fault_detail(number), now);
         } else {
             self.emcy.restart_silently();
         }
@@ -105,12 +106,13 @@ impl<D: Definition> Inner<D> {
     /// EMCY has been switched on: reports the active faults. Messages that have waited are older.
     pub(super) fn report_active(&mut self, now: Instant) {
         self.emcy.forget_waiting();
-        self.emcy.repeat_singles(now);
+        let application = &self.application;
+        self.emcy.repeat_singles(|number| application.fault_detail(number), now);
         for number in self.watches.lost() {
-            let _ = self.emcy.repeat(Fault::Heartbeat(number), now);
+            let _ = self.emcy.repeat(Fault::Heartbeat(number), None, now);
         }
         for fault in self.rpdos.as_ref().iter().flat_map(crate::pdo::Rpdo::active) {
-            let _ = self.emcy.repeat(fault, now);
+            let _ = self.emcy.repeat(fault, None, now);
         }
         self.services_due = STALE;
     }
@@ -135,7 +137,11 @@ impl<D: Definition> Inner<D> {
     #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
         let is_new = if Self::has(Services::EMCY) {
-            self.emcy.raise(fault, now)
+            let detail = match fault {
+                Fault::Application(number) => self.application.fault_detail(number),
+                _ => None,
+            };
+            self.emcy.raise(fault, detail, now)
         } else {
             self.emcy.raise_silently(fault)
         };

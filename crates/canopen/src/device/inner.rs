@@ -236,7 +236,7 @@ impl<D: Definition> Inner<D> {
             self.on_watch(change, context.now);
         }
         if Self::has(Services::EMCY) && self.state.has_services() {
-            self.emcy.poll(context);
+            self.emcy.poll(D::Application::LISTS_DETAIL, context);
         }
         if Self::has(Services::FAULTS) {
             self.react();

@@ -5,6 +5,7 @@ mod bench;
 mod block;
 mod dictionary;
 mod emcy;
+mod emcy_detail;
 mod events;
 #[path = "../exchange/mod.rs"]
 mod exchange;

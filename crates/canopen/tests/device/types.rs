@@ -38,7 +38,7 @@ const ROWS: &[Object] = canopen::rows!(
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 #[derive(Default)]
-struct Sent(Vec<Frame>);
+pub(crate) struct Sent(pub(crate) Vec<Frame>);
 
 impl Transmit for Sent {
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
