@@ -28,6 +28,10 @@ pub trait Application {
     /// [`Abort::Command`], and the client downloads in segments.
     const BLOCK_DOWNLOAD: bool = true;
 
+    /// Whether SDO requests of less than eight bytes are taken, as if zeros followed. CiA 301, 7.2.4.3, demands eight
+    /// bytes, but some older controllers send less. Otherwise such a request is ignored.
+    const SHORT_REQUESTS: bool = false;
+
     /// Whether the device has an LSS slave (CiA 305, optional). Without one, the device needs a node-ID from its caller.
     const LSS: bool = true;
 
@@ -55,6 +59,15 @@ pub trait Application {
     /// PDOs on or off accordingly. This takes time in proportion to the number of PDOs.
     fn switches_pdos(&self, _entry: &Entry) -> bool {
         false
+    }
+
+    /// An SDO client reads this entry. The method may set its value in `image`, or refuse the upload. A domain asks
+    /// [`read_domain`](Application::read_domain) instead.
+    ///
+    /// # Errors
+    /// The reason to refuse the upload.
+    fn read(&mut self, _entry: &Entry, _image: &mut [u8]) -> Result<(), Abort> {
+        Ok(())
     }
 
     /// An SDO client has written this entry.

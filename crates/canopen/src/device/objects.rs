@@ -14,10 +14,13 @@ impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
     const BLOCK_DOWNLOAD: bool = D::Application::BLOCK_DOWNLOAD;
 
-    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
+    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
         if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
+        }
+        if !entry.is_domain() {
+            self.application.read(&entry, self.image.as_mut())?;
         }
         match entry.attributes.kind {
             Type::Domain => self.application.read_domain(at),

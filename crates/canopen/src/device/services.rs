@@ -106,7 +106,7 @@ impl<D: Definition> Device<D> {
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        match frame.full(self.services.sdo_request) {
+        match self.request(frame) {
             Some(request) => {
                 // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
                 // transfer.
@@ -161,10 +161,17 @@ impl<D: Definition> Device<D> {
         self.send_due_services(now, out);
     }
 
+    /// The data of a request to the SDO server.
+    #[inline]
+    fn request<'a>(&self, frame: &'a Frame) -> Option<&'a [u8; 8]> {
+        let id = self.services.sdo_request;
+        frame.full(id).or_else(|| if D::Application::SHORT_REQUESTS { frame.short(id) } else { None })
+    }
+
     /// Whether a frame is a request to the SDO server.
     #[inline]
     pub(super) fn is_request(&self, frame: &Frame) -> bool {
-        frame.full(self.services.sdo_request).is_some()
+        self.request(frame).is_some()
     }
 
     #[inline]
@@ -197,7 +204,7 @@ impl<D: Definition> Device<D> {
     fn send_block(&mut self, context: &mut Context<'_, impl Transmit>) {
         let id = self.inner.service(SDO_RESPONSE);
         let server = &mut self.services.server;
-        let has_reply = server.send_block(&self.inner, context.now, |data| {
+        let has_reply = server.send_block(&mut self.inner, context.now, |data| {
             context.room() > Inner::<D>::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
         let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Instant::NEVER };

@@ -36,8 +36,8 @@ pub(crate) trait Objects {
     /// Whether block downloads are supported.
     const BLOCK_DOWNLOAD: bool;
 
-    /// The value of an entry.
-    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
+    /// The value of an entry. The application may set it before.
+    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry accepts a download, or why it does not.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and applies its effect.
@@ -79,7 +79,7 @@ impl Source {
     pub(super) fn content<'a>(
         &self,
         buffer: &'a [u8; BUFFER],
-        objects: &'a impl Objects,
+        objects: &'a mut impl Objects,
     ) -> Result<&'a [u8], Abort> {
         let content = if self.len <= BUFFER { buffer } else { objects.read(self.at)? };
         content.get(..self.len).ok_or(Abort::General)
@@ -90,7 +90,7 @@ impl Source {
         &self,
         offset: usize,
         buffer: &[u8; BUFFER],
-        objects: &impl Objects,
+        objects: &mut impl Objects,
     ) -> Result<Bytes<7>, Abort> {
         let content = self.content(buffer, objects)?;
         Ok(Bytes::from_slice(content.get(offset..).unwrap_or(&[])))

@@ -242,7 +242,7 @@ impl<O: Objects> Server<O> {
     /// message.
     pub(crate) fn send_block(
         &mut self,
-        objects: &O,
+        objects: &mut O,
         now: Instant,
         send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {

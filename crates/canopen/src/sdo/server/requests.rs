@@ -109,7 +109,7 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
     }
 
-    fn upload_segment(&mut self, toggle: bool, objects: &O) -> Answer {
+    fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
         let segment = upload.next(toggle, &self.buffer, objects)?;
         if segment.last {
