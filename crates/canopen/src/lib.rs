@@ -30,6 +30,7 @@ pub mod sdo;
 mod sync;
 pub mod testing;
 mod time;
+mod time_stamp;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
@@ -41,6 +42,7 @@ pub use frame::Frame;
 pub use node_id::NodeId;
 pub use sdo::Part;
 pub use time::{Duration, Instant};
+pub use time_stamp::TimeOfDay;
 pub use transmit::{QueueFull, Transmit};
 
 /// What the macros name; not for other use.

@@ -29,7 +29,7 @@
 pub mod pdo;
 mod program;
 
-use crate::dictionary::{Access, DefaultValue, Group, Object, Type, fail};
+use crate::dictionary::{Access, DefaultValue, Group, Object, Rule, Type, fail};
 
 pub use pdo::{multiplexed, rpdo, tpdo};
 pub use program::{flash_status, program_control, program_data, program_identification};
@@ -98,6 +98,24 @@ pub const fn sync_consumer() -> [Object; 4] {
         parameter(0x1007, 0, "Synchronous window length", Type::Unsigned32).unit("us"),
         parameter(0x1019, 0, "Synchronous counter overflow value", Type::Unsigned8).limits(0, 240),
     ]
+}
+
+/// The rows of [`sync_consumer`] for a device that can also produce SYNC, every `period` us: bit 30 of 1005h switches the
+/// production on, and is set by default unless the period is 0.
+#[must_use]
+pub const fn sync_producer(period: u32) -> [Object; 4] {
+    let mut rows = sync_consumer();
+    rows[0] = rows[0].value(if period == 0 { 0x80 } else { 0x4000_0080 });
+    rows[0].rule = Rule::SyncProducer;
+    rows[1] = rows[1].value(period as i64);
+    rows
+}
+
+/// 1012h, the time stamp with CAN-ID 100h. Bit 31: the application gets it, by default. Bit 30: the application can send
+/// it.
+#[must_use]
+pub const fn time_stamp() -> Object {
+    parameter(0x1012, 0, "COB-ID time stamp", Type::Unsigned32).value(0x8000_0100)
 }
 
 /// A string of at most `capacity` characters. If `text` is empty, the application writes the string to the image.

@@ -5,6 +5,7 @@ use crate::dictionary::{Entry, Group, Groups};
 use crate::emcy::{Condition, ErrorClass, Fault};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Part};
+use crate::time_stamp::TimeOfDay;
 
 /// The application code of a product: the behaviour behind the objects. Every method has a default that does nothing,
 /// so an application implements only the methods that it needs.
@@ -80,6 +81,9 @@ pub trait Application {
     /// A SYNC has arrived in the state Operational. The data of the synchronous RPDOs is in the image; the synchronous
     /// TPDOs are sent when the method returns. `counter` is `None` where 1019h asks for no counter.
     fn synchronised(&mut self, _counter: Option<u8>, _image: &mut [u8]) {}
+
+    /// A time stamp has arrived.
+    fn time(&mut self, _time: TimeOfDay, _image: &mut [u8]) {}
 
     /// The NMT state has changed.
     fn state(&mut self, _state: State, _image: &mut [u8]) {}

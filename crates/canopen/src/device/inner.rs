@@ -10,7 +10,7 @@ use crate::lss::Identity;
 use crate::nmt::State;
 use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
 use crate::transmit::Context;
-use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync};
+use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync, time_stamp};
 
 /// Identity object.
 const IDENTITY: u16 = 0x1018;
@@ -29,6 +29,8 @@ pub(super) struct Inner<D: Definition> {
     pub(super) application: D::Application,
     pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
     pub(super) sync: sync::Consumer,
+    pub(super) sync_producer: sync::Producer,
+    pub(super) time_stamp: time_stamp::Service,
     pub(super) emcy: emcy::Producer,
     pub(super) tpdos: D::Tpdos,
     pub(super) rpdos: D::Rpdos,
@@ -75,6 +77,8 @@ impl<D: Definition> Inner<D> {
             application,
             watches: heartbeat::Consumer::new(),
             sync: sync::Consumer::new(),
+            sync_producer: sync::Producer::new(),
+            time_stamp: time_stamp::Service::new(),
             emcy,
             tpdos: D::Tpdos::filled(Tpdo::new),
             rpdos: D::Rpdos::filled(Rpdo::new),
@@ -97,9 +101,10 @@ impl<D: Definition> Inner<D> {
         D::SERVICES.contains(service)
     }
 
-    /// Whether the device has process data.
-    pub(super) const fn has_pdos() -> bool {
-        Self::has(Services::TPDO) || Self::has(Services::RPDO)
+    /// Whether the device has process data, or sends or receives SYNCs or time stamps.
+    pub(super) const fn has_process() -> bool {
+        let pdos = Self::has(Services::TPDO) || Self::has(Services::RPDO);
+        pdos || Self::has(Services::SYNC_PRODUCER) || Self::has(Services::TIME)
     }
 
     pub(super) fn is_initialising(&self) -> bool {
@@ -154,8 +159,12 @@ impl<D: Definition> Inner<D> {
         if state == self.state {
             return;
         }
+        let had_services = self.state.has_services();
         (self.state, self.services_due) = (state, STALE);
-        if Self::has_pdos() {
+        if Self::has(Services::SYNC_PRODUCER) && had_services != state.has_services() {
+            self.restart_sync();
+        }
+        if Self::has_process() {
             self.start_or_stop_pdos(state);
         }
         self.application.state(state, self.image.as_mut());
@@ -201,6 +210,9 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::SYNC) {
             self.configure_sync(now);
         }
+        if Self::has(Services::TIME) {
+            self.configure_time();
+        }
         if Self::has(Services::EMCY) {
             let _ = self.emcy.configure(self.number_or(0x1014, 0, emcy::OFF));
             self.emcy.set_inhibit(low_half(self.number(0x1015, 0)), now);
@@ -208,7 +220,7 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::HEARTBEAT_CONSUMER) {
             self.configure_watches(now);
         }
-        if Self::has_pdos() {
+        if Self::has_process() {
             self.configure_pdos(now);
         }
         if Self::has(Services::FAULTS) {

@@ -40,7 +40,11 @@ impl LssSlave {
     }
 
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
-        self.slave = Slave::new(Configuration { bit_rate, ..self.slave.pending() });
+        self.slave.set_pending(Configuration { bit_rate, ..self.slave.pending() });
+    }
+
+    pub(super) fn set_node_id(&mut self, node_id: Option<NodeId>) {
+        self.slave.set_pending(Configuration { node_id, ..self.slave.pending() });
     }
 
     /// A reset of the device.

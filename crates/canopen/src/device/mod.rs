@@ -25,6 +25,7 @@ mod services;
 mod state;
 mod store;
 mod syncs;
+mod times;
 mod watches;
 
 pub use application::Application;

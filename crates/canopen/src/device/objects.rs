@@ -8,7 +8,7 @@ use super::store::{check_program_control, command};
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
-use crate::{Instant, emcy, sync};
+use crate::{Instant, emcy, sync, time_stamp};
 
 impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
@@ -87,7 +87,7 @@ impl<D: Definition> Inner<D> {
         self.application.write(entry, bytes, self.image.as_mut())?;
         entry.field.set(self.image.as_mut(), bytes);
         self.pending.parameters_changed();
-        if Self::has_pdos() && self.application.switches_pdos(entry) {
+        if Self::has_process() && self.application.switches_pdos(entry) {
             self.apply_application_changes(now);
             (self.process_due, self.services_due) = (STALE, STALE);
         }
@@ -105,7 +105,7 @@ impl<D: Definition> Inner<D> {
         }
         self.apply(entry, value, now);
         self.services_due = STALE;
-        if Self::has_pdos() {
+        if Self::has_process() {
             self.process_due = STALE;
         }
         Ok(())
@@ -128,6 +128,12 @@ impl<D: Definition> Inner<D> {
         match entry.rule() {
             Rule::ErrorCount if value != 0 && Self::has(Services::FAULTS) => Err(Abort::InvalidValue),
             Rule::SyncCobId if Self::has(Services::SYNC) => sync::check_cob_id(value),
+            Rule::SyncProducer if Self::has(Services::SYNC_PRODUCER) => {
+                sync::check_producer(self.word(entry.field), value)
+            }
+            Rule::TimeCobId if Self::has(Services::TIME) => {
+                time_stamp::check_cob_id(self.word(entry.field), value)
+            }
             Rule::SyncOverflow if Self::has(Services::SYNC) => {
                 sync::check_overflow(value, self.number(0x1006, 0))
             }
@@ -154,7 +160,7 @@ impl<D: Definition> Inner<D> {
             | Rule::PdoSyncStart
             | Rule::PdoCount
             | Rule::PdoSlot
-                if Self::has_pdos() =>
+                if Self::has_process() =>
             {
                 self.check_pdo(entry, value)
             }
@@ -167,7 +173,12 @@ impl<D: Definition> Inner<D> {
         match entry.rule() {
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),
-            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow
+            Rule::TimeCobId if Self::has(Services::TIME) => self.configure_time(),
+            Rule::SyncCobId
+            | Rule::SyncProducer
+            | Rule::SyncPeriod
+            | Rule::SyncWindow
+            | Rule::SyncOverflow
                 if Self::has(Services::SYNC) =>
             {
                 self.configure_sync(now);
@@ -194,7 +205,7 @@ impl<D: Definition> Inner<D> {
             | Rule::PdoEventTimer
             | Rule::EventTimerOf(_)
             | Rule::PdoSyncStart
-                if Self::has_pdos() =>
+                if Self::has_process() =>
             {
                 self.configure_pdo(entry, now);
             }
@@ -202,7 +213,12 @@ impl<D: Definition> Inner<D> {
         }
         if matches!(
             entry.rule(),
-            Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
+            Rule::SyncCobId
+                | Rule::SyncProducer
+                | Rule::TimeCobId
+                | Rule::PdoCobId
+                | Rule::PdoPredefined
+                | Rule::HeartbeatWatch
         ) && Self::has(Services::FAULTS)
         {
             self.pending.identifiers_changed();

@@ -6,6 +6,7 @@ use super::{Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::nmt::Command;
 use crate::pdo::{Chain, ProcessContext, Rpdo, Tpdo};
+use crate::time_stamp::TimeOfDay;
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 impl<D: Definition> Device<D> {
@@ -42,7 +43,10 @@ impl<D: Definition> Device<D> {
         if is_nmt {
             self.on_nmt(frame);
         }
-        if !Inner::<D>::has_pdos() {
+        if !Inner::<D>::has_process() {
+            return;
+        }
+        if D::SERVICES.contains(Services::TIME) && self.inner.on_time(frame) {
             return;
         }
         let context = &mut self.services.process_context(now, out);
@@ -62,7 +66,7 @@ impl<D: Definition> Device<D> {
     /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if Inner::<D>::has_pdos() && now >= self.inner.process_due {
+        if Inner::<D>::has_process() && now >= self.inner.process_due {
             let context = &mut self.services.process_context(now, out);
             self.inner.send_process(context);
         }
@@ -95,6 +99,12 @@ impl<D: Definition> Device<D> {
         }
         self.inner.send_process(context);
         self.process_next()
+    }
+
+    /// Sends the time stamp, if bit 30 of 1012h is set and the NMT state allows it. Returns whether it is sent.
+    pub fn send_time(&mut self, time: TimeOfDay, now: Instant, out: &mut impl Transmit) -> bool {
+        let context = &mut self.services.process_context(now, out);
+        self.inner.time_frame(time).is_some_and(|frame| context.send(frame))
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
@@ -130,7 +140,8 @@ impl<D: Definition> Device<D> {
         let requests =
             self.inner.tpdos.as_ref().iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
         let sync = Some(self.inner.sync.id()).filter(|_| D::SERVICES.contains(Services::SYNC));
-        [CanId::NMT].into_iter().chain(sync).chain(received).chain(requests.map(|tpdo| tpdo.id))
+        let time = self.inner.time_stamp.consumed().filter(|_| D::SERVICES.contains(Services::TIME));
+        [CanId::NMT].into_iter().chain(sync).chain(time).chain(received).chain(requests.map(|tpdo| tpdo.id))
     }
 }
 
@@ -163,6 +174,9 @@ impl<D: Definition> Inner<D> {
 
     #[inline(never)]
     pub(super) fn run_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        if Self::has(Services::SYNC_PRODUCER) {
+            self.produce_sync(context);
+        }
         if Self::has(Services::SYNC) {
             self.poll_sync(context.now);
         }
@@ -178,6 +192,9 @@ impl<D: Definition> Inner<D> {
         }
         if Self::has(Services::SYNC) {
             due = due.min(self.sync.due());
+        }
+        if Self::has(Services::SYNC_PRODUCER) {
+            due = due.min(self.sync_producer.due());
         }
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
         debug_assert!(due > context.now, "process data are still due after a poll");

@@ -49,9 +49,13 @@ impl<D: Definition> Services<D> {
 
     /// Sets the bit rate at which the bus runs.
     pub(super) fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
-        if Inner::<D>::has_pdos() {
+        if Inner::<D>::has_process() {
             self.budget.set_bit_rate(bit_rate.kbit());
         }
+    }
+
+    pub(super) fn set_node_id(&mut self, node_id: Option<NodeId>) {
+        self.lss.set_node_id(node_id);
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.

@@ -7,7 +7,7 @@ use super::{Action, Application, Device, Job, Next, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
 use crate::pdo::ProcessContext;
-use crate::{Instant, Transmit};
+use crate::{Instant, NodeId, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
@@ -157,6 +157,20 @@ impl<D: Definition> Device<D> {
         let inner = &mut self.inner;
         inner.application.initialise(inner.image.as_mut());
         inner.pending.values_loaded();
+    }
+
+    /// Carries out an NMT command of the application itself, as one of the master. A device that has not started ignores
+    /// it.
+    pub fn nmt(&mut self, command: Command, now: Instant, out: &mut impl Transmit) -> Next {
+        if self.inner.node_id.is_some() && !self.inner.is_initialising() {
+            self.command(command);
+        }
+        self.poll(now, out)
+    }
+
+    /// Sets the node-ID with which the next [`start`](Device::start) begins; `None` to wait for one from LSS.
+    pub fn set_node_id(&mut self, node_id: Option<NodeId>) {
+        self.services.set_node_id(node_id);
     }
 
     pub(super) fn command(&mut self, command: Command) {

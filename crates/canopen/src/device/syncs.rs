@@ -3,21 +3,54 @@
 use super::Definition;
 use super::inner::Inner;
 use super::{Application, STALE};
+use crate::dictionary::Services;
 use crate::emcy::Fault;
 use crate::pdo::{Chain, ProcessContext};
 use crate::sync::Settings;
+use crate::transmit::RETRY;
 use crate::{Frame, Instant, Transmit};
 
 impl<D: Definition> Inner<D> {
     pub(super) fn configure_sync(&mut self, now: Instant) {
         let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
-        self.sync.configure(Settings {
+        let settings = Settings {
             cob_id: self.number_or(0x1005, 0, 0x80),
             period: self.number(0x1006, 0),
             window: self.number(0x1007, 0),
             overflow,
-        });
+        };
+        if Self::has(Services::SYNC_PRODUCER) {
+            self.sync_producer.configure(&settings);
+            self.restart_sync();
+        }
+        self.sync.configure(settings);
         self.clear(Fault::SyncMissing, now);
+    }
+
+    /// Begins or ends the production of SYNCs, after a change of the settings or of the NMT state.
+    pub(super) fn restart_sync(&mut self) {
+        if self.state.has_services() {
+            self.sync_producer.restart()
+        } else {
+            self.sync_producer.stop()
+        }
+        self.process_due = STALE;
+    }
+
+    /// Sends the SYNC that is due, and reacts to it as to the SYNC of another node. Nothing precedes the boot-up message.
+    #[inline(never)]
+    pub(super) fn produce_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        if context.now < self.sync_producer.due() {
+            return;
+        }
+        let frame = self.sync_producer.frame();
+        if self.heartbeat.boots_up() || !context.send(frame) {
+            return self.sync_producer.wait_until(context.now.plus(RETRY));
+        }
+        self.sync_producer.sent(context.now);
+        if self.state.has_pdos() {
+            self.on_sync(&frame, context);
+        }
     }
 
     pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {

@@ -106,6 +106,7 @@ const fn check_rule(row: &Object) {
             Rule::Application | Rule::Setting | Rule::StoreCalibration | Rule::EventTimerOf(_)
         ),
         Rule::PdoCobId => matches!(row.rule, Rule::PdoPredefined),
+        Rule::SyncCobId => matches!(row.rule, Rule::SyncProducer),
         // A bootloader controls the program itself.
         Rule::ProgramControl => matches!(row.rule, Rule::Application),
         _ => false,

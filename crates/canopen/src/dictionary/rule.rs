@@ -13,6 +13,8 @@ pub enum Rule {
     ErrorEntry,
     /// 1005h, COB-ID of SYNC.
     SyncCobId,
+    /// 1005h of a device that can produce SYNC.
+    SyncProducer,
     /// 1006h, communication cycle period.
     SyncPeriod,
     /// 1007h, synchronous window length.
@@ -21,6 +23,8 @@ pub enum Rule {
     Store,
     /// 1011h:1 and up, restore default parameters.
     Restore,
+    /// 1012h, COB-ID of the time stamp.
+    TimeCobId,
     /// 1014h, COB-ID of EMCY.
     EmcyCobId,
     /// 1015h, inhibit time of EMCY.
@@ -74,6 +78,7 @@ impl Rule {
             (0x1007, 0) => Rule::SyncWindow,
             (0x1010, 1..) => Rule::Store,
             (0x1011, 1..) => Rule::Restore,
+            (0x1012, 0) => Rule::TimeCobId,
             (0x1014, 0) => Rule::EmcyCobId,
             (0x1015, 0) => Rule::EmcyInhibit,
             (0x1016, 1..) => Rule::HeartbeatWatch,
@@ -138,6 +143,8 @@ impl Rule {
             Rule::StoreCalibration => 24,
             Rule::Setting => 25,
             Rule::Application => 26,
+            Rule::SyncProducer => 27,
+            Rule::TimeCobId => 28,
             Rule::EventTimerOf(number) => 0x100 | number as u16,
         }
     }

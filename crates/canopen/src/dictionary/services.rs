@@ -25,6 +25,11 @@ impl Services {
     /// Start without a command of the master: the rows have 1F80h.
     pub const SELF_START: Services = Services(1 << 6);
 
+    /// SYNC producer: the rows are those of [`sync_producer`](crate::objects::sync_producer).
+    pub const SYNC_PRODUCER: Services = Services(1 << 7);
+    /// Time stamp, consumer and producer: the rows have 1012h.
+    pub const TIME: Services = Services(1 << 8);
+
     /// TPDOs, RPDOs, the heartbeat consumer and the multiplexed TPDO follow from the numbers in
     /// [`Sizes`](super::Sizes).
     pub(crate) const TPDO: Services = Services(1 << 16);
@@ -48,6 +53,8 @@ impl Services {
                 Rule::SyncCobId => Services::SYNC,
                 Rule::EmcyCobId => Services::EMCY,
                 Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting => Services::STORE,
+                Rule::SyncProducer => Services::SYNC.with(Services::SYNC_PRODUCER),
+                Rule::TimeCobId => Services::TIME,
                 Rule::ProgramControl => Services::PROGRAM_CONTROL,
                 Rule::StartUp => Services::SELF_START,
                 Rule::PdoCount if row.index < 0x1800 && can_be_multiplexed(row) => Services::MULTIPLEXED_RPDO,

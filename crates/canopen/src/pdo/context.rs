@@ -30,6 +30,11 @@ impl<T: Transmit> ProcessContext<'_, T> {
         self.takes_event(frame.id(), len) && self.out.send(frame).is_ok() && self.spend(len)
     }
 
+    /// Queues a SYNC or a time stamp. `false` when there is no room.
+    pub(crate) fn send(&mut self, frame: Frame) -> bool {
+        self.is_open && self.out.send(frame).is_ok()
+    }
+
     /// Whether `send_event` would take a frame with this CAN-ID and number of bytes now.
     pub(crate) fn takes_event(&mut self, id: u16, len: usize) -> bool {
         self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)

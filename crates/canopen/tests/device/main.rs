@@ -15,6 +15,7 @@ mod lss;
 mod mapping;
 mod multiplexed;
 mod nmt;
+mod producers;
 mod requests;
 mod robustness;
 mod rows;
