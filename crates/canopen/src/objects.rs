@@ -164,6 +164,16 @@ pub const fn restore_parameters() -> [Object; 4] {
     ]
 }
 
+/// 100Ch and 100Dh: node guarding without life guarding. A master that guards the device switches the heartbeat (1017h)
+/// off.
+#[must_use]
+pub const fn node_guarding() -> [Object; 2] {
+    [
+        parameter(0x100C, 0, "Guard time", Type::Unsigned16).unit("ms"),
+        parameter(0x100D, 0, "Life time factor", Type::Unsigned8),
+    ]
+}
+
 /// 1014h and 1015h: EMCY with CAN-ID 80h plus the node-ID, and no inhibit time.
 #[must_use]
 pub const fn emergency() -> [Object; 2] {

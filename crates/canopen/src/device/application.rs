@@ -1,6 +1,7 @@
 //! The interface between a device and the application code of the product.
 
 use super::{Soundness, Stored};
+use crate::NodeId;
 use crate::dictionary::{Entry, Group, Groups};
 use crate::emcy::{Condition, ErrorClass, Fault};
 use crate::nmt::State;
@@ -94,6 +95,10 @@ pub trait Application {
     fn fault_detail(&self, _number: u8) -> Option<[u8; 5]> {
         None
     }
+
+    /// A node whose heartbeat is monitored (1016h) is in another state than before, or boots up
+    /// ([`State::Initialising`]). A heartbeat that is missing is a [`fault`](Application::fault).
+    fn node_state(&mut self, _node: NodeId, _state: State, _image: &mut [u8]) {}
 
     /// A fault has occurred (`active`) or is over.
     fn fault(&mut self, _fault: Fault, _active: bool, _image: &mut [u8]) {}

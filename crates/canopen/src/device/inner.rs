@@ -6,6 +6,7 @@ use super::state::{Pending, SELF_START, Scope};
 use super::{Action, Application, Definition, STALE, store};
 use crate::array::Array;
 use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
+use crate::emcy::Fault;
 use crate::lss::Identity;
 use crate::nmt::State;
 use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
@@ -25,6 +26,7 @@ pub(super) struct Inner<D: Definition> {
     pub(super) process_due: Instant,
     pub(super) services_due: Instant,
     pub(super) heartbeat: heartbeat::Producer,
+    pub(super) guarding: heartbeat::Guarding,
     pub(super) pending: Pending,
     pub(super) application: D::Application,
     pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
@@ -73,6 +75,7 @@ impl<D: Definition> Inner<D> {
             process_due: Instant::NEVER,
             services_due: Instant::NEVER,
             heartbeat: heartbeat::Producer::new(),
+            guarding: heartbeat::Guarding::new(),
             pending: Pending::new(),
             application,
             watches: heartbeat::Consumer::new(),
@@ -220,6 +223,10 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::HEARTBEAT_CONSUMER) {
             self.configure_watches(now);
         }
+        if Self::has(Services::GUARDING) {
+            self.configure_guarding(now);
+            self.guarding.restart();
+        }
         if Self::has_process() {
             self.configure_pdos(now);
         }
@@ -247,6 +254,9 @@ impl<D: Definition> Inner<D> {
         {
             self.on_watch(change, context.now);
         }
+        if Self::has(Services::GUARDING) && self.guarding.expire(context.now) {
+            self.raise(Fault::LifeGuard, context.now);
+        }
         if Self::has(Services::EMCY) && self.state.has_services() {
             self.emcy.poll(D::Application::LISTS_DETAIL, context);
         }
@@ -259,6 +269,7 @@ impl<D: Definition> Inner<D> {
     pub(super) fn errors_due(&self) -> Instant {
         let is_sent = Self::has(Services::EMCY) && self.state.has_services();
         let emcy = if is_sent { self.emcy.due() } else { Instant::NEVER };
-        if Self::has(Services::HEARTBEAT_CONSUMER) { emcy.min(self.watches.due()) } else { emcy }
+        let due = if Self::has(Services::GUARDING) { emcy.min(self.guarding.due()) } else { emcy };
+        if Self::has(Services::HEARTBEAT_CONSUMER) { due.min(self.watches.due()) } else { due }
     }
 }

@@ -103,6 +103,13 @@ impl<D: Definition> Device<D> {
         self.inner.state
     }
 
+    /// The NMT state of a node whose heartbeat is monitored (1016h); `None` before its first heartbeat, and while its
+    /// heartbeat is missing.
+    #[must_use]
+    pub fn state_of(&self, node: NodeId) -> Option<State> {
+        self.inner.watches.state(node)
+    }
+
     /// The values of all objects.
     #[must_use]
     pub fn image(&self) -> &D::Image {

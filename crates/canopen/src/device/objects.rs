@@ -174,6 +174,9 @@ impl<D: Definition> Inner<D> {
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),
             Rule::TimeCobId if Self::has(Services::TIME) => self.configure_time(),
+            Rule::GuardTime | Rule::LifeTimeFactor if Self::has(Services::GUARDING) => {
+                self.configure_guarding(now);
+            }
             Rule::SyncCobId
             | Rule::SyncProducer
             | Rule::SyncPeriod

@@ -3,6 +3,7 @@
 use super::inner::Inner;
 use super::lss::LssSlave;
 use super::{Application as _, Definition, Device, Next, STALE};
+use crate::dictionary::Services as Has;
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::pdo::{Budget, ProcessContext};
@@ -13,7 +14,7 @@ use crate::{CanId, Frame, Instant, NodeId, Transmit};
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
 const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
-const ERROR_CONTROL: u16 = 0x700;
+pub(super) const ERROR_CONTROL: u16 = 0x700;
 
 /// The SDO server and the LSS slave of a device, with the responses that wait for room in the queue.
 pub(super) struct Services<D: Definition> {
@@ -134,11 +135,13 @@ impl<D: Definition> Device<D> {
         self.services_next()
     }
 
-    /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).
+    /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame), data and remote.
     pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
         let sdo = self.inner.node_id.map(|own| own.service(SDO_REQUEST));
         let lss = D::Application::LSS.then_some(lss::REQUEST);
-        lss.into_iter().chain(sdo).chain(self.inner.watches.ids())
+        let own = self.inner.node_id.filter(|_| Inner::<D>::has(Has::GUARDING));
+        let guarding = own.map(|own| own.service(ERROR_CONTROL));
+        lss.into_iter().chain(sdo).chain(guarding).chain(self.inner.watches.ids())
     }
 
     /// Takes a request to the SDO server.
@@ -157,10 +160,13 @@ impl<D: Definition> Device<D> {
         if D::Application::LSS && frame.id() == lss::REQUEST.get() {
             let context = &mut self.services.context(now, out);
             self.services.lss.take_frame(frame, context, &mut self.inner);
-        } else if Inner::<D>::has(crate::dictionary::Services::HEARTBEAT_CONSUMER)
-            && frame.id() & 0x780 == ERROR_CONTROL
-        {
-            self.inner.take_heartbeat(frame, now);
+        } else if frame.id() & 0x780 == ERROR_CONTROL {
+            if Inner::<D>::has(Has::GUARDING) {
+                self.inner.on_guard(frame, &mut self.services.context(now, out));
+            }
+            if Inner::<D>::has(Has::HEARTBEAT_CONSUMER) {
+                self.inner.take_heartbeat(frame, now);
+            }
         }
         self.send_due_services(now, out);
     }

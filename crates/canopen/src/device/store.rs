@@ -104,8 +104,8 @@ impl<D: Definition> Device<D> {
 
     /// Whether a pause of `span` disturbs no service, for example while the erase of a flash page stops the core. The
     /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
-    /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and no heartbeat of another node (1016h) is
-    /// due.
+    /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and neither a heartbeat of another node (1016h)
+    /// nor a remote frame of a guarding master (100Ch) is due.
     #[must_use]
     pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
         let inner = &self.inner;
@@ -113,6 +113,7 @@ impl<D: Definition> Device<D> {
             && self.services.is_between_requests()
             && now + span <= inner.heartbeat.latest()
             && now + span <= inner.watches.due()
+            && now + span <= inner.guarding.due()
     }
 }
 

@@ -1,12 +1,16 @@
 //! The heartbeats of other nodes: object 1016h, and the reaction to a missing heartbeat.
 
+use super::Application;
 use super::Definition;
 use super::inner::Inner;
+use super::pdos::low_half;
+use super::services::ERROR_CONTROL;
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::heartbeat::{Change, Watch};
 use crate::sdo::Abort;
-use crate::{Frame, Instant};
+use crate::transmit::Context;
+use crate::{Frame, Instant, Transmit};
 
 const CONSUMER_TIME: u16 = 0x1016;
 
@@ -16,10 +20,37 @@ impl<D: Definition> Inner<D> {
         if self.is_initialising() {
             return;
         }
-        if let Some(change) = self.watches.take(frame, now) {
+        let (application, image) = (&mut self.application, self.image.as_mut());
+        let change = self.watches.take(frame, now, |node, state| application.node_state(node, state, image));
+        if let Some(change) = change {
             self.on_watch(change, now);
         }
         self.services_due = self.services_due.min(self.watches.due());
+    }
+
+    /// Answers a remote frame of a guarding master. A device with a heartbeat is not guarded.
+    #[inline(never)]
+    pub(super) fn on_guard(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+        let id = self.service(ERROR_CONTROL);
+        let is_guarded = !self.is_initialising() && !self.heartbeat.boots_up() && !self.heartbeat.is_on();
+        if !frame.is_remote() || frame.id() != id.get() || !is_guarded {
+            return;
+        }
+        let (answer, is_back) = self.guarding.answer(self.state, context.now);
+        // In a full queue the answer is dropped: the master repeats its request.
+        let _ = context.send(Frame::data_frame(id, 1, [answer, 0, 0, 0, 0, 0, 0, 0]));
+        if is_back {
+            self.clear(Fault::LifeGuard, context.now);
+        }
+        self.serve_until(self.guarding.due());
+    }
+
+    /// Gives life guarding its times, from 100Ch and 100Dh.
+    pub(super) fn configure_guarding(&mut self, now: Instant) {
+        let [factor, ..] = self.number(0x100D, 0).to_le_bytes();
+        if self.guarding.configure(low_half(self.number(0x100C, 0)), factor) {
+            self.clear(Fault::LifeGuard, now);
+        }
     }
 
     pub(super) fn on_watch(&mut self, change: Change, now: Instant) {

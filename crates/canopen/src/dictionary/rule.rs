@@ -19,6 +19,10 @@ pub enum Rule {
     SyncPeriod,
     /// 1007h, synchronous window length.
     SyncWindow,
+    /// 100Ch, guard time.
+    GuardTime,
+    /// 100Dh, life time factor.
+    LifeTimeFactor,
     /// 1010h:1 and up, store parameters.
     Store,
     /// 1011h:1 and up, restore default parameters.
@@ -76,6 +80,8 @@ impl Rule {
             (0x1005, 0) => Rule::SyncCobId,
             (0x1006, 0) => Rule::SyncPeriod,
             (0x1007, 0) => Rule::SyncWindow,
+            (0x100C, 0) => Rule::GuardTime,
+            (0x100D, 0) => Rule::LifeTimeFactor,
             (0x1010, 1..) => Rule::Store,
             (0x1011, 1..) => Rule::Restore,
             (0x1012, 0) => Rule::TimeCobId,
@@ -145,6 +151,8 @@ impl Rule {
             Rule::Application => 26,
             Rule::SyncProducer => 27,
             Rule::TimeCobId => 28,
+            Rule::GuardTime => 29,
+            Rule::LifeTimeFactor => 30,
             Rule::EventTimerOf(number) => 0x100 | number as u16,
         }
     }
@@ -164,6 +172,7 @@ impl Rule {
         match self {
             Rule::Plain | Rule::Application => None,
             Rule::ErrorCount
+            | Rule::LifeTimeFactor
             | Rule::SyncOverflow
             | Rule::ProgramControl
             | Rule::PdoType
@@ -171,6 +180,7 @@ impl Rule {
             | Rule::PdoCount
             | Rule::Setting => Some(1),
             Rule::EmcyInhibit
+            | Rule::GuardTime
             | Rule::HeartbeatTime
             | Rule::PdoInhibit
             | Rule::PdoEventTimer

@@ -30,6 +30,9 @@ impl Services {
     /// Time stamp, consumer and producer: the rows have 1012h.
     pub const TIME: Services = Services(1 << 8);
 
+    /// Node guarding and life guarding: the rows have 100Ch.
+    pub const GUARDING: Services = Services(1 << 9);
+
     /// TPDOs, RPDOs, the heartbeat consumer and the multiplexed TPDO follow from the numbers in
     /// [`Sizes`](super::Sizes).
     pub(crate) const TPDO: Services = Services(1 << 16);
@@ -54,6 +57,7 @@ impl Services {
                 Rule::EmcyCobId => Services::EMCY,
                 Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting => Services::STORE,
                 Rule::SyncProducer => Services::SYNC.with(Services::SYNC_PRODUCER),
+                Rule::GuardTime => Services::GUARDING,
                 Rule::TimeCobId => Services::TIME,
                 Rule::ProgramControl => Services::PROGRAM_CONTROL,
                 Rule::StartUp => Services::SELF_START,

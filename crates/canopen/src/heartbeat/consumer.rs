@@ -1,6 +1,7 @@
 //! The heartbeat consumer (CiA 301, 7.2.8.2.2.2): monitors the heartbeats of other nodes.
 
 use crate::array::Array;
+use crate::nmt::State;
 use crate::{CanId, Duration, Frame, Instant, NodeId};
 
 /// An entry of 1016h: a node, and the longest time between two of its heartbeats.
@@ -41,11 +42,13 @@ pub struct Monitored {
     /// When the heartbeat is missing. `NEVER` until the first heartbeat, and while the heartbeat is lost.
     due: Instant,
     is_lost: bool,
+    /// The state in the last heartbeat; `None` before the first one, and while the heartbeat is lost.
+    state: Option<State>,
 }
 
 impl Monitored {
     const fn new(watch: Option<Watch>) -> Monitored {
-        Monitored { watch, due: Instant::NEVER, is_lost: false }
+        Monitored { watch, due: Instant::NEVER, is_lost: false, state: None }
     }
 }
 
@@ -81,18 +84,34 @@ impl<E: Array<Monitored>> Consumer<E> {
         self.entries.as_ref().iter().map(|entry| entry.watch.map(|watch| watch.node))
     }
 
-    /// Takes a heartbeat or a boot-up message.
-    pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Option<Change> {
-        if frame.len() != 1 || frame.is_remote() {
-            return None;
-        }
+    /// Takes a heartbeat or a boot-up message. `changed` gets a new state of a node, and every boot-up.
+    pub(crate) fn take(
+        &mut self,
+        frame: &Frame,
+        now: Instant,
+        changed: impl FnOnce(NodeId, State),
+    ) -> Option<Change> {
+        let &[code] = frame.data() else { return None };
+        let state = State::from_code(code);
         for (number, entry) in (0..).zip(self.entries.as_mut()) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
                 entry.due = now.plus(Duration::from_millis(watch.period.into()));
+                let before = core::mem::replace(&mut entry.state, state);
+                if let Some(state) =
+                    state.filter(|state| before != Some(*state) || *state == State::Initialising)
+                {
+                    changed(watch.node, state);
+                }
                 return core::mem::take(&mut entry.is_lost).then_some(Change::Back(number));
             }
         }
         None
+    }
+
+    /// The state of a monitored node; `None` before its first heartbeat, and while its heartbeat is lost.
+    pub(crate) fn state(&self, node: NodeId) -> Option<State> {
+        let mut entries = self.entries.as_ref().iter();
+        entries.find(|entry| entry.watch.is_some_and(|watch| watch.node == node))?.state
     }
 
     /// The entries whose heartbeat is lost, from 0.
@@ -108,7 +127,7 @@ impl<E: Array<Monitored>> Consumer<E> {
     /// Reports one missing heartbeat. Must be called until the result is `None`.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
         let (number, entry) = (0..).zip(self.entries.as_mut()).find(|(_, entry)| now >= entry.due)?;
-        (entry.due, entry.is_lost) = (Instant::NEVER, true);
+        (entry.due, entry.is_lost, entry.state) = (Instant::NEVER, true, None);
         Some(Change::Lost(number))
     }
 }

@@ -9,6 +9,7 @@ mod emcy_detail;
 mod events;
 #[path = "../exchange/mod.rs"]
 mod exchange;
+mod guarding;
 mod heartbeat;
 mod hooks;
 mod lss;
