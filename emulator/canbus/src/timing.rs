@@ -24,10 +24,11 @@ impl BitTiming {
         BitTiming { bit, segment1, segment2, jump }
     }
 
-    /// Eight quanta with the sample point at 87.5 %, as CiA 301 recommends.
+    /// Sixteen quanta with the sample point at 87.5 %, as CiA 301 recommends. With eight, a receiver that is a quantum ahead
+    /// would end its acknowledgement before a transmitter samples at 88.8 %, because this wire has no delay.
     #[must_use]
     pub const fn nominal(bit: Time) -> BitTiming {
-        BitTiming::new(bit, 6, 1, 1)
+        BitTiming::new(bit, 13, 2, 1)
     }
 
     /// The length of a bit.

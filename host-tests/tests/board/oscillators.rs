@@ -19,6 +19,16 @@ fn boards_with_oscillators_a_thousandth_off_understand_each_other_at_every_bit_r
     }
 }
 
+/// Also beside an adapter, which acknowledges by a clock of its own.
+#[test]
+fn a_board_with_a_crystal_of_any_tolerance_understands_the_adapter() {
+    for ppm in [-2000, -300, -50, -20, 20, 50, 100, 300, 700, 2000] {
+        let flags = format!("--bitrate 1000 --node 1:pressure --oscillator 1={ppm}");
+        let report = run(&mut world(&flags), SECOND);
+        assert_eq!((report.bus.errors, report.nodes[0].heard.boot_ups), (0, 1), "{ppm} ppm");
+    }
+}
+
 #[test]
 fn boards_with_oscillators_one_per_cent_off_do_not() {
     assert!(heard(1000, 10_000).0 > 0);
