@@ -31,7 +31,7 @@ mod program;
 
 use crate::dictionary::{Access, DefaultValue, Group, Object, Rule, Type, fail};
 
-pub use pdo::{multiplexed, rpdo, tpdo};
+pub use pdo::{multiplexed, rpdo, rpdos, tpdo, tpdos};
 pub use program::{flash_status, program_control, program_data, program_identification};
 
 /// A read-only value of the device.
@@ -271,19 +271,46 @@ pub const fn with<const N: usize>(mut rows: [Object; N], sub: u8, value: i64) ->
     rows
 }
 
-/// Sorts rows by index and sub-index.
+/// Sorts rows by index and sub-index. A merge sort of their positions: the compiler takes a second for ten thousand rows.
 #[must_use]
-pub const fn sorted<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
-    let mut end = 1;
-    while end < N {
-        let mut at = end;
-        while at > 0 && rows[at - 1].key() > rows[at].key() {
-            (rows[at - 1], rows[at]) = (rows[at], rows[at - 1]);
-            at -= 1;
-        }
-        end += 1;
+pub const fn sorted<const N: usize>(rows: [Object; N]) -> [Object; N] {
+    let (mut keys, mut order, mut i) = ([0; N], [0; N], 0);
+    while i < N {
+        (keys[i], order[i]) = (rows[i].key(), i);
+        i += 1;
     }
-    rows
+    let mut width = 1;
+    while width < N {
+        order = merged(&keys, &order, width);
+        width *= 2;
+    }
+    let (mut sorted, mut i) = (rows, 0);
+    while i < N {
+        sorted[i] = rows[order[i]];
+        i += 1;
+    }
+    sorted
+}
+
+/// Merges each two neighbouring runs of `width` positions.
+const fn merged<const N: usize>(keys: &[u32; N], order: &[usize; N], width: usize) -> [usize; N] {
+    let (mut merged, mut at) = ([0; N], 0);
+    while at < N {
+        let (mut a, mut b) = (at, lesser(at + width, N));
+        let (middle, end) = (b, lesser(b + width, N));
+        while at < end {
+            let is_first = a < middle && (b == end || keys[order[a]] <= keys[order[b]]);
+            let from = if is_first { &mut a } else { &mut b };
+            merged[at] = order[*from];
+            *from += 1;
+            at += 1;
+        }
+    }
+    merged
+}
+
+const fn lesser(a: usize, b: usize) -> usize {
+    if a < b { a } else { b }
 }
 
 /// Builds a sorted table of rows from parts in any order: arrays and slices of

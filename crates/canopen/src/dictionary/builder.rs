@@ -27,8 +27,9 @@ const MAX_ATTRIBUTES: usize = 256;
 #[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
 #[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
 impl TableBuilder {
-    pub(super) const fn of(all: &[&[Object]]) -> TableBuilder {
-        let mut builder = TableBuilder {
+    /// The tables of no rows yet. `any` is a row to fill the unused elements with.
+    pub(super) const fn new(any: &Object) -> TableBuilder {
+        TableBuilder {
             series: [Series {
                 index: 0,
                 offset: 0,
@@ -39,19 +40,14 @@ impl TableBuilder {
                 entries: 0,
             }; MAX],
             places: [Place { sub: 0, attributes: 0, offset: 0 }; MAX],
-            attributes: [attributes(&all[0][0]); MAX_ATTRIBUTES],
+            attributes: [attributes(any); MAX_ATTRIBUTES],
             defaults: [0; MAX_DEFAULTS],
             used: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
-        };
-        let mut i = 0;
-        while i < all.len() {
-            builder.add(all[i]);
-            i += 1;
         }
-        builder
     }
 
-    const fn add(&mut self, rows: &[Object]) {
+    /// Adds a table of rows.
+    pub(super) const fn add(&mut self, rows: &[Object]) {
         let (mut row, mut offset) = (0, 0);
         while row < rows.len() {
             let entries = object_len(rows, row);
@@ -144,7 +140,12 @@ impl TableBuilder {
     /// equal sequence already stored.
     const fn add_defaults(&mut self, defaults_len: usize) -> usize {
         let (start, mut first) = (self.used.defaults, 0);
-        while !self.has_defaults(first, start, defaults_len) {
+        // Most positions differ in the first byte.
+        let byte = self.defaults[start];
+        while self.defaults[first] != byte || !self.has_defaults(first, start, defaults_len) {
+            if defaults_len == 0 {
+                break;
+            }
             first += 1;
         }
         self.used.defaults = larger(start, first + defaults_len);
@@ -174,6 +175,25 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.mapping as u8 == b.mapping as u8
         && group_code(a.group) == group_code(b.group)
         && a.node_relative == b.node_relative
+}
+
+/// Whether two rows have the same attributes. Rows of a series are equal as they are written; only then is nothing
+/// computed.
+pub(super) const fn is_alike(a: &Object, b: &Object) -> bool {
+    let same_limits = match (a.limits, b.limits) {
+        (None, None) => true,
+        (Some((low, high)), Some((other_low, other_high))) => low == other_low && high == other_high,
+        _ => false,
+    };
+    let is_equal = same_limits
+        && a.kind.code() == b.kind.code()
+        && a.kind.size() == b.kind.size()
+        && a.rule.code() == b.rule.code()
+        && a.access as u8 == b.access as u8
+        && a.mapping as u8 == b.mapping as u8
+        && group_code(a.group) == group_code(b.group)
+        && matches!(a.default, DefaultValue::NodeId(_)) == matches!(b.default, DefaultValue::NodeId(_));
+    is_equal || is_same(&attributes(a), &attributes(b))
 }
 
 /// A number for each group: constant functions cannot compare groups.

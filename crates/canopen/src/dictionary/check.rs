@@ -31,7 +31,7 @@ pub const fn check(rows: &[Object]) {
     i = 0;
     while i < rows.len() {
         check_event_timer(rows, &rows[i]);
-        check_pdo_row(rows, &rows[i]);
+        check_pdo_row(rows, i);
         i += 1;
     }
 }

@@ -10,11 +10,12 @@ use crate::CobId;
 /// The objects that describe a PDO. In both directions, the mapping parameter has bit 9 set.
 const MAPPING: u16 = 0x0200;
 
-/// Checks a row of a communication parameter or of a mapping parameter.
-pub(super) const fn check_pdo_row(rows: &[Object], row: &Object) {
+/// Checks the row at a position, if it is the first row of a communication parameter or of a mapping parameter.
+pub(super) const fn check_pdo_row(rows: &[Object], at: usize) {
+    let row = &rows[at];
     match row.index {
         0x1400..=0x15FF | 0x1800..=0x19FF if row.sub == 0 => check_communication(rows, row),
-        0x1600..=0x17FF | 0x1A00..=0x1BFF if row.sub == 0 => check_mapping(rows, row),
+        0x1600..=0x17FF | 0x1A00..=0x1BFF if row.sub == 0 => check_mapping(rows, at),
         _ => (),
     }
 }
@@ -72,7 +73,8 @@ const fn check_communication(rows: &[Object], row: &Object) {
 
 /// Checks the mapping entries: each maps an object in this direction with its length, and together the mapped objects
 /// have eight bytes at most.
-const fn check_mapping(rows: &[Object], row: &Object) {
+const fn check_mapping(rows: &[Object], at: usize) {
+    let row = &rows[at];
     let has_parameter = find(rows, row.index & !MAPPING, 0).is_some();
     require(has_parameter, row, "the mapping parameter has no communication parameter");
     let mut count = default_byte(row);
@@ -80,17 +82,20 @@ const fn check_mapping(rows: &[Object], row: &Object) {
         count = 0;
     }
     require(count <= 64, row, "a PDO maps at most 64 objects");
-    let (mut sub, mut bits) = (1, 0);
-    while sub < u8::MAX {
-        match find(rows, row.index, sub) {
-            Some(slot) => {
-                let mapped = check_slot(rows, &rows[slot], sub <= count);
-                bits += if sub <= count { mapped as u32 } else { 0 };
-            }
-            None if sub <= count => fail(row.index, sub, "the PDO maps more objects than it has entries"),
-            None => (),
+    // The mapping entries follow in the order of their sub-indexes.
+    let (mut slot, mut entries, mut bits) = (at + 1, 0, 0);
+    while slot < rows.len() && rows[slot].index == row.index {
+        let is_used = rows[slot].sub <= count;
+        let mapped = check_slot(rows, &rows[slot], is_used);
+        (entries, bits) = if is_used { (entries + 1, bits + mapped as u32) } else { (entries, bits) };
+        slot += 1;
+    }
+    if entries < count {
+        let mut missing = 1;
+        while find(rows, row.index, missing).is_some() {
+            missing += 1;
         }
-        sub += 1;
+        fail(row.index, missing, "the PDO maps more objects than it has entries");
     }
     require(bits <= 64, row, "the mapped objects have more than eight bytes");
 }

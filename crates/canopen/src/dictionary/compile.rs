@@ -1,7 +1,7 @@
 //! Compiles rows to run-time tables. All of this runs during compilation: a panic here is a compile error.
 #![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
-use super::builder::{TableBuilder, attributes, is_same, larger};
+use super::builder::{TableBuilder, is_alike, larger};
 use super::{Access, Dictionary, Object, Services, Tables, Type, check};
 
 /// The number of rows in all parts of a table.
@@ -97,12 +97,13 @@ impl Counts {
     /// During compilation, when a table is wrong: see [`check`](super::check).
     #[must_use]
     pub const fn of(all: &[&[Object]]) -> Counts {
-        let mut i = 0;
+        let (mut builder, mut i) = (TableBuilder::new(&all[0][0]), 0);
         while i < all.len() {
             check(all[i]);
+            builder.add(all[i]);
             i += 1;
         }
-        TableBuilder::of(all).used
+        builder.used
     }
 }
 
@@ -115,13 +116,13 @@ impl Counts {
 pub const fn compile<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize>(
     all: &[&[Object]; D],
 ) -> Tables<D, S, P, A, V> {
-    let TableBuilder { series, places, attributes, defaults, .. } = TableBuilder::of(all);
-    let (mut ends, mut end, mut i) = ([0; D], 0, 0);
+    let (mut builder, mut ends, mut i) = (TableBuilder::new(&all[0][0]), [0; D], 0);
     while i < D {
-        end += series_count(all[i]);
-        ends[i] = end as u16;
+        builder.add(all[i]);
+        ends[i] = builder.used.series as u16;
         i += 1;
     }
+    let TableBuilder { series, places, attributes, defaults, .. } = builder;
     Tables {
         series: beginning(&series),
         places: beginning(&places),
@@ -172,16 +173,6 @@ pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
     find(rows, 0x1800 | number as u16, 5).expect("the TPDO has no event timer")
 }
 
-/// How many series the objects of a table form.
-const fn series_count(rows: &[Object]) -> usize {
-    let (mut total, mut row) = (0, 0);
-    while row < rows.len() {
-        row += object_len(rows, row) * series_len(rows, row);
-        total += 1;
-    }
-    total
-}
-
 /// The number of rows of the object that begins at `first`.
 pub(super) const fn object_len(rows: &[Object], first: usize) -> usize {
     let mut end = first + 1;
@@ -213,7 +204,7 @@ const fn continues(rows: &[Object], first: usize, len: usize, objects: usize) ->
     let mut i = 0;
     while i < len {
         let (a, b) = (&rows[first + i], &rows[start + i]);
-        if a.sub != b.sub || !a.rule.has_place() || !is_same(&attributes(a), &attributes(b)) {
+        if a.sub != b.sub || !a.rule.has_place() || !is_alike(a, b) {
             return false;
         }
         i += 1;

@@ -144,6 +144,66 @@ pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
     rows
 }
 
+/// `N` RPDOs, from number `first` on. Each maps the `K` objects of its element. `as_flattened` makes them a part for
+/// [`rows!`](crate::rows!).
+///
+/// ```
+/// use canopen::dictionary::{Access, Mapping, Object, Type};
+/// use canopen::objects;
+///
+/// const fn value(sub: u8) -> [Object; 1] {
+///     [Object::new(0x2000, sub, "Value", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Both)]
+/// }
+/// const PDOS: [[Object; 13]; 2] = objects::rpdos(1, &[value(1), value(2)]);
+/// const ROWS: &[Object] = canopen::rows!(PDOS.as_flattened(), [Object::highest(0x2000, 2, ""), value(1)[0], value(2)[0]]);
+/// ```
+///
+/// # Panics
+/// During compilation, as [`rpdo`].
+#[must_use]
+pub const fn rpdos<const N: usize, const K: usize>(
+    first: u16,
+    objects: &[[Object; K]; N],
+) -> [[Object; 13]; N] {
+    let mut rows = [[count(0x1600, "", 0); 13]; N];
+    let mut n = 0;
+    while n < N {
+        rows[n] = rpdo(first + n as u16, &objects[n]);
+        n += 1;
+    }
+    rows
+}
+
+/// `N` TPDOs, from number `first` on. Each maps the `K` objects of its element. `as_flattened` makes them a part for
+/// [`rows!`](crate::rows!).
+///
+/// ```
+/// use canopen::dictionary::{Access, Mapping, Object, Type};
+/// use canopen::objects;
+///
+/// const fn value(sub: u8) -> [Object; 1] {
+///     [Object::new(0x2000, sub, "Value", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Both)]
+/// }
+/// const PDOS: [[Object; 15]; 2] = objects::tpdos(1, &[value(1), value(2)]);
+/// const ROWS: &[Object] = canopen::rows!(PDOS.as_flattened(), [Object::highest(0x2000, 2, ""), value(1)[0], value(2)[0]]);
+/// ```
+///
+/// # Panics
+/// During compilation, as [`tpdo`].
+#[must_use]
+pub const fn tpdos<const N: usize, const K: usize>(
+    first: u16,
+    objects: &[[Object; K]; N],
+) -> [[Object; 15]; N] {
+    let mut rows = [[count(0x1A00, "", 0); 15]; N];
+    let mut n = 0;
+    while n < N {
+        rows[n] = tpdo(first + n as u16, &objects[n]);
+        n += 1;
+    }
+    rows
+}
+
 /// A mapping parameter for `objects`, which must be mappable in this direction.
 const fn mapping_of(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
     if objects.len() > 8 {

@@ -198,3 +198,29 @@ fn a_node_id_of_the_application_is_used_from_the_next_start() {
     let _ = node.start(Instant(2), &mut sent);
     assert_eq!((node.node_id(), sent.0.len()), (None, 0));
 }
+
+/// An application whose hook changes a mapped value: the statusword of a drive that follows the controlword.
+#[derive(Default)]
+struct Echo;
+
+impl Application for Echo {
+    fn state(&mut self, state: State, image: &mut [u8]) {
+        DICTIONARY.field(0x6000, 0).set_u8(image, state.code());
+    }
+}
+
+#[test]
+fn publish_sends_what_a_hook_has_changed() {
+    let mut node: canopen::device!(Echo, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Echo);
+    let mut sent = Sent::default();
+    let _ = node.start(Instant(0), &mut sent);
+    let [low, high] = 0x1800_u16.to_le_bytes();
+    let event_driven = Frame::new(0x605, &[0x2F, low, high, 2, 255, 0, 0, 0]).unwrap();
+    let _ = node.on_frame(&event_driven, Instant(1), &mut sent);
+    let _ = node.publish(Instant(2), &mut sent, |_, _| ());
+    let _ = node.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(3), &mut sent);
+    let _ = node.publish(Instant(4), &mut sent, |_, _| ());
+    let values: Vec<_> =
+        sent.0.iter().filter(|frame| frame.id() == 0x185).map(|frame| frame.data()[0]).collect();
+    assert_eq!(values.last(), Some(&5), "{values:?}");
+}
