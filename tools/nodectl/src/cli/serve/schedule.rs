@@ -224,10 +224,10 @@ mod tests {
         schedule.add(node(1), Haste::Background, None, "a");
         schedule.add(node(2), Haste::Background, None, "b");
         schedule.add(node(1), Haste::Asked, None, "c");
-        assert_eq!(begun(&mut schedule), ["b", "c"]);
-        schedule.done(1);
-        assert_eq!(begun(&mut schedule), [""; 0]);
+        assert_eq!(begun(&mut schedule), ["c", "b"]);
         schedule.done(2);
+        assert_eq!(begun(&mut schedule), [""; 0]);
+        schedule.done(1);
         assert_eq!(begun(&mut schedule), ["a"]);
         assert!(schedule.has(node(1)) && !schedule.has(node(2)));
     }
