@@ -11,12 +11,16 @@ mod fuzz;
 mod hal_examples;
 mod images;
 mod matrix;
+mod metadata;
 mod mutants;
 mod own_tool;
+mod packages;
 mod pictures;
 mod plots;
 mod progress;
 mod regressions;
+mod reproducible;
+mod sbom;
 mod setup;
 mod sim;
 mod target;
@@ -106,6 +110,8 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
+    /// Write the software bill of materials of each product (CycloneDX): packages, checksums, licences, compiler
+    Sbom(sbom::Flags),
     /// Install what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
@@ -152,6 +158,7 @@ fn run(command: Command) -> Result<()> {
         Command::Timing => timing::print(),
         Command::Panics => callgraph::panics(Tools::ByCargo),
         Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo),
+        Command::Sbom(flags) => sbom::write(&flags),
         Command::Setup { dry_run } => setup::run(dry_run),
         Command::Test(flags) => test::run(&flags),
         Command::ProbeLibclang => setup::probe(),
