@@ -60,6 +60,7 @@ def test_a_page_of_another_site_sends_no_frames_and_gives_no_commands(tmp_path: 
     simulator = Simulator("--control", "127.0.0.1:0", "--candump", str(log), speed="real")
     master = Master(simulator)
     heartbeats = master.listen(0x701)
+    master.node.nmt.send_command(1)
     heartbeats.until(lambda data: data == b"\x05")
     driver.get(OtherSite(tmp_path).url)
     text = "< open vcan0 >< rawmode >< send 000 2 2 0 >\r\rC\rS8\rO\rt00020200\rquit\npressure const:1\n"
