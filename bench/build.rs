@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SCRIPT: &str = "MEMORY { BENCH (rx) : ORIGIN = 0x08000000, LENGTH = 512K }\nREGION_ALIAS(\"FLASH\", BENCH);\n_stack_start = ORIGIN(RAM) + LENGTH(RAM);\n";
+const SCRIPT: &str = "MEMORY { BENCH (rx) : ORIGIN = 0x08000000, LENGTH = 512K\n BENCH_RAM (rwx) : ORIGIN = 0x20006000, LENGTH = 106240 }\nREGION_ALIAS(\"FLASH\", BENCH);\nREGION_ALIAS(\"RAM\", BENCH_RAM);\n_stack_start = ORIGIN(RAM) + LENGTH(RAM);\n";
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

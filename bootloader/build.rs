@@ -5,5 +5,5 @@ mod link;
 
 fn main() {
     println!("cargo:rerun-if-changed=bootloader.x");
-    link::image("BOOTLOADER", "bootloader.x");
+    link::image(["BOOTLOADER", "LOADER_RAM"], "bootloader.x");
 }

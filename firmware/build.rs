@@ -4,6 +4,6 @@
 mod link;
 
 fn main() {
-    link::image("APPLICATION", "link.x");
+    link::image(["APPLICATION", "NODE_RAM"], "link.x");
     println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
 }

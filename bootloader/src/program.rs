@@ -1,6 +1,7 @@
 //! The program on the bus: effects of a master's commands, and values of the objects of CiA 302-3.
 
-use bsp::{ProgramFlash, board};
+use bsp::ProgramFlash;
+use bsp::boards::BOARD;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};
@@ -113,7 +114,7 @@ impl Application for Program {
     const BLOCK_UPLOAD: bool = false;
 
     fn initialise(&mut self, image: &mut [u8]) {
-        HARDWARE.set(image, board::NAME.as_bytes());
+        HARDWARE.set(image, BOARD.name.as_bytes());
         let identity = [product::VENDOR_ID, self.product, product::REVISION, self.serial_number];
         for (field, value) in IDENTITY.into_iter().zip(identity) {
             field.store(image, value.to_le_bytes());

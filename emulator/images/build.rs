@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SCRIPT: &str = "REGION_ALIAS(\"FLASH\", BOOTLOADER);\n_stack_start = ORIGIN(STACK) + LENGTH(STACK);\n_stack_end = ORIGIN(STACK);\n";
+const SCRIPT: &str = "REGION_ALIAS(\"FLASH\", BOOTLOADER);\nREGION_ALIAS(\"RAM\", LOADER_RAM);\n_stack_start = ORIGIN(STACK) + LENGTH(STACK);\n_stack_end = ORIGIN(STACK);\n";
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

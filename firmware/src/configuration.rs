@@ -2,6 +2,7 @@
 
 use core::mem::MaybeUninit;
 
+use bsp::boards::BOARD;
 use bsp::reset_cause::ResetCause;
 use bsp::update_layout::LAYOUT;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
@@ -107,7 +108,7 @@ fn setup(record: Option<DeviceRecord>) -> Setup {
         bit_rate: stored_rate.unwrap_or(default_rate),
         serial_number: factory::serial_number(),
         program_id: memory::program_id(),
-        hardware_version: board::NAME,
+        hardware_version: BOARD.name,
         software_version: env!("CARGO_PKG_VERSION"),
     }
 }

@@ -25,6 +25,9 @@ pub(crate) struct Options {
     /// Instead of the tables, say where the instructions of the operations are whose name contains this
     #[arg(long, value_name = "OPERATION")]
     profile: Option<String>,
+    /// Instead of the tables, print the bytes of each module of the library in our devices
+    #[arg(long)]
+    by_module: bool,
 }
 
 impl Options {
@@ -51,6 +54,9 @@ pub(crate) fn measure(options: &Options, tools: Tools) -> Result<()> {
     }
     if let Some(operation) = &options.profile {
         command.arg("--profile").arg(operation);
+    }
+    if options.by_module {
+        command.arg("--by-module");
     }
     run(&mut command)
 }

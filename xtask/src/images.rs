@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::command::{root, run, target_dir};
 use crate::own_tool::Tools;
@@ -21,6 +21,9 @@ pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development
 
 /// The default chip of the images.
 pub(crate) const CHIP: &str = "stm32f446";
+
+/// The features of the boards with the other chips (crates/bsp/src/boards).
+const OTHER_BOARDS: [&str; 2] = ["weact-f405rg", "black-f407ve"];
 
 /// The other chips. The second is the first with Ethernet and a camera, which the images do not use. So the first
 /// stands for both in quick tests.
@@ -53,7 +56,9 @@ pub(crate) fn check_for(toolchain: &Toolchain, chip: &str) -> Result<()> {
 }
 
 fn call_cargo_for(toolchain: &Toolchain, verb: &str, chip: &str) -> Result<()> {
-    let features = ["--no-default-features", "--features", chip];
+    let mut boards = OTHER_CHIPS.iter().zip(OTHER_BOARDS);
+    let board = boards.find_map(|(other, board)| (*other == chip).then_some(board));
+    let features = ["--no-default-features", "--features", board.context("no board has this chip")?];
     let mut command = toolchain.cargo(verb, &["--release", "-p", "firmware", "-p", "bootloader"]);
     progress::build(chip, command.args(features).args(DEVELOPMENT))
 }

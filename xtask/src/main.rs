@@ -1,6 +1,7 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
 mod bench;
+mod bringup;
 mod callgraph;
 mod command;
 mod coverage;
@@ -69,6 +70,13 @@ enum Command {
     },
     /// Put bootloader and signed application on a board at a debug probe, and print the log (docs/board.md)
     Flash(flash::Flags),
+    /// Take a new board at a debug probe and a CAN adapter through fifteen steps, and write a report (docs/board.md); --emulated: the emulated board
+    #[command(disable_help_flag = true)]
+    Bringup {
+        /// Flags of the tool
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        flags: Vec<OsString>,
+    },
     /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
     Eds,
     /// Write docs/plots/*.svg and the tables of docs/measuring.md from the measurement chain
@@ -132,6 +140,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Some(Command::Sim { flags }) => sim::run(&flags),
         Some(Command::Flash(flags)) => flash::run(&flags),
+        Some(Command::Bringup { flags }) => bringup::run(&flags),
         Some(command) => run(command).map(|()| ExitCode::SUCCESS),
         None => list().map(|()| ExitCode::SUCCESS),
     };
@@ -145,7 +154,9 @@ fn run(command: Command) -> Result<()> {
     match command {
         Command::Images { development: true } => images::build(Tools::ByCargo),
         Command::Images { development: false } => images::build_for_owner(),
-        Command::Sim { .. } | Command::Flash(_) => unreachable!("these have an exit status of their own"),
+        Command::Sim { .. } | Command::Flash(_) | Command::Bringup { .. } => {
+            unreachable!("these have an exit status of their own")
+        }
         Command::FaultInjection { flags } => fault_injection::try_all(&flags),
         Command::Eds => eds::write(),
         Command::Plots => plots::write(),

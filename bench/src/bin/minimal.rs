@@ -20,6 +20,8 @@ struct Keeper;
 
 impl Application for Keeper {
     const BLOCK_UPLOAD: bool = false;
+    const BLOCK_DOWNLOAD: bool = false;
+    const LSS: bool = false;
 }
 
 const INPUT: Object = Object::new(0x6000, 0, "", Type::Integer32, Access::ReadOnly).mappable(Mapping::Tpdo);

@@ -13,6 +13,7 @@ pub mod backup_copies;
 pub mod battery;
 pub mod bit_rate_detection;
 pub mod bit_timing;
+pub mod boards;
 pub mod bus_state;
 pub mod chip_thermometer;
 pub mod crash_record;

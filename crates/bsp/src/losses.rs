@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 /// Kinds of events that can be lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A received frame for which the FIFO or the queue behind it had no room.
+    /// A received frame for which the FIFO or the queue behind it had no room, or whose mailbox was not released in time.
     Frame = 0,
     /// A millisecond of samples that was overwritten before it was collected.
     Millisecond = 1,
@@ -27,10 +27,12 @@ pub enum Event {
     Flash = 7,
     /// The CAN controller did not leave the bus in time; it was reset.
     CanMode = 8,
+    /// A change of the parameter memory was refused, because the supply was below 2.9 V.
+    Supply = 9,
 }
 
 /// Number of kinds of [`Event`].
-pub const EVENTS: usize = 9;
+pub const EVENTS: usize = 10;
 
 /// The number of lost events of each kind since the start.
 #[derive(Debug, Default)]
@@ -69,13 +71,16 @@ mod tests {
 
     #[test]
     fn each_kind_has_its_own_count() {
-        use Event::{Alarm, BackupWrite, CanMode, Flash, Frame, Index, Millisecond, Sampling, SsiWord};
-        let kinds = [Frame, Millisecond, Sampling, SsiWord, Index, Alarm, BackupWrite, Flash, CanMode];
+        use Event::{
+            Alarm, BackupWrite, CanMode, Flash, Frame, Index, Millisecond, Sampling, SsiWord, Supply,
+        };
+        let kinds =
+            [Frame, Millisecond, Sampling, SsiWord, Index, Alarm, BackupWrite, Flash, CanMode, Supply];
         let losses = Losses::new();
         for (n, kind) in (1..).zip(kinds) {
             (0..n).for_each(|_| losses.count(kind));
         }
-        assert_eq!(losses.all(), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
+        assert_eq!(losses.all(), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
         assert_eq!(kinds.map(|kind| losses.of(kind)), losses.all());
     }
 }

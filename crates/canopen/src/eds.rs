@@ -129,6 +129,9 @@ fn write_entry(row: &Object, object_type: u8, out: &mut impl Write) -> Result {
     };
     writeln!(out, "ObjectType=0x{object_type}\nDataType=0x{:04X}\nAccessType={access}", row.kind.code())?;
     match row.default {
+        DefaultValue::Integer(bits) if row.kind == Type::Real64 => {
+            writeln!(out, "DefaultValue={:?}", f64::from_bits(bits.cast_unsigned()))?;
+        }
         DefaultValue::Integer(value) => writeln!(out, "DefaultValue={value}")?,
         DefaultValue::Real(value) => writeln!(out, "DefaultValue={value:?}")?,
         DefaultValue::Text(text) => writeln!(out, "DefaultValue={text}")?,

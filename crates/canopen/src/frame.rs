@@ -42,6 +42,12 @@ impl Frame {
         (self.head == id.into().0).then_some(&self.data)
     }
 
+    /// The data, followed by zeros, if this is a data frame of one to seven bytes with this identifier.
+    pub(crate) fn short(&self, id: FullFrameId) -> Option<&[u8; 8]> {
+        let is_short = matches!(self.len(), 1..=7) && !self.is_remote() && head(self.id(), 8) == id.0;
+        is_short.then_some(&self.data)
+    }
+
     /// A remote frame; `None` for an identifier above 7FFh or a length above eight.
     #[must_use]
     pub fn remote(id: u16, len: u8) -> Option<Frame> {

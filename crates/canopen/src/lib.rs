@@ -8,6 +8,7 @@
     warn(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+mod array;
 mod can_id;
 pub mod client;
 mod copy;
@@ -29,15 +30,25 @@ pub mod sdo;
 mod sync;
 pub mod testing;
 mod time;
+mod time_stamp;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
 pub use device::{
-    Action, Application, BusEvent, Device, ErrorClass, Job, Next, Node, Part, ServiceDevice, Soundness,
-    Stored,
+    Action, Application, BusEvent, Definition, Device, Job, Next, ServiceDevice, Soundness, Stored,
 };
-pub use emcy::{Condition, Fault};
+pub use emcy::{Condition, ErrorClass, Fault};
 pub use frame::Frame;
 pub use node_id::NodeId;
+pub use sdo::Part;
 pub use time::{Duration, Instant};
+pub use time_stamp::TimeOfDay;
 pub use transmit::{QueueFull, Transmit};
+
+/// What the macros name; not for other use.
+#[doc(hidden)]
+pub mod plumbing {
+    pub use crate::array::Array;
+    pub use crate::device::Rows;
+    pub use crate::heartbeat::Monitored;
+}

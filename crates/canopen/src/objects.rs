@@ -29,7 +29,7 @@
 pub mod pdo;
 mod program;
 
-use crate::dictionary::{Access, DefaultValue, Group, Object, Type, fail};
+use crate::dictionary::{Access, DefaultValue, Group, Object, Rule, Type, fail};
 
 pub use pdo::{multiplexed, rpdo, tpdo};
 pub use program::{flash_status, program_control, program_data, program_identification};
@@ -100,6 +100,24 @@ pub const fn sync_consumer() -> [Object; 4] {
     ]
 }
 
+/// The rows of [`sync_consumer`] for a device that can also produce SYNC, every `period` us: bit 30 of 1005h switches the
+/// production on, and is set by default unless the period is 0.
+#[must_use]
+pub const fn sync_producer(period: u32) -> [Object; 4] {
+    let mut rows = sync_consumer();
+    rows[0] = rows[0].value(if period == 0 { 0x80 } else { 0x4000_0080 });
+    rows[0].rule = Rule::SyncProducer;
+    rows[1] = rows[1].value(period as i64);
+    rows
+}
+
+/// 1012h, the time stamp with CAN-ID 100h. Bit 31: the application gets it, by default. Bit 30: the application can send
+/// it.
+#[must_use]
+pub const fn time_stamp() -> Object {
+    parameter(0x1012, 0, "COB-ID time stamp", Type::Unsigned32).value(0x8000_0100)
+}
+
 /// A string of at most `capacity` characters. If `text` is empty, the application writes the string to the image.
 const fn text(index: u16, name: &'static str, capacity: u8, text: &'static str) -> Object {
     Object::new(index, 0, name, Type::VisibleString(capacity), Access::Const)
@@ -143,6 +161,16 @@ pub const fn restore_parameters() -> [Object; 4] {
         command(0x1011, 1, "Restore all"),
         command(0x1011, 2, "Restore communication"),
         command(0x1011, 3, "Restore application"),
+    ]
+}
+
+/// 100Ch and 100Dh: node guarding without life guarding. A master that guards the device switches the heartbeat (1017h)
+/// off.
+#[must_use]
+pub const fn node_guarding() -> [Object; 2] {
+    [
+        parameter(0x100C, 0, "Guard time", Type::Unsigned16).unit("ms"),
+        parameter(0x100D, 0, "Life time factor", Type::Unsigned8),
     ]
 }
 

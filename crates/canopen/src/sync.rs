@@ -1,4 +1,9 @@
-//! SYNC consumer (CiA 301, 7.2.5): recognises SYNC messages, monitors their period and the synchronous window.
+//! SYNC consumer (CiA 301, 7.2.5): recognises SYNC messages, monitors their period and the synchronous window. The
+//! producer is in its own file.
+
+mod producer;
+
+pub(crate) use producer::Producer;
 
 use crate::sdo::Abort;
 use crate::{CanId, CobId, Duration, Frame, Instant};
@@ -109,11 +114,18 @@ impl Consumer {
     }
 }
 
-/// Checks a new value of 1005h. Bit 30 would make the node a SYNC producer, which is not supported; bit 31 has no
+/// Checks a new value of 1005h of a device that consumes SYNC only: bit 30 would make it a producer. Bit 31 has no
 /// meaning.
 pub(crate) fn check_cob_id(value: u32) -> Result<(), Abort> {
     let cob_id = CobId::parse(value).ok_or(Abort::InvalidValue)?;
     if cob_id.bit30 || cob_id.id.is_restricted() { Err(Abort::InvalidValue) } else { Ok(()) }
+}
+
+/// Checks a new value of 1005h of a device that can produce SYNC. The CAN-ID cannot change while the device produces.
+pub(crate) fn check_producer(old: u32, new: u32) -> Result<(), Abort> {
+    let new = CobId::parse(new).filter(|new| !new.id.is_restricted()).ok_or(Abort::InvalidValue)?;
+    let moves = CobId::parse(old).is_some_and(|old| old.bit30 && new.bit30 && old.id != new.id);
+    if moves { Err(Abort::InvalidValue) } else { Ok(()) }
 }
 
 /// Checks a new value of 1019h, which cannot change while there is a period (1006h).

@@ -147,6 +147,10 @@ impl Application for NodeApplication {
         }
     }
 
+    fn switches_pdos(&self, entry: &Entry) -> bool {
+        !matches!(entry.index(), PROGRAM_TRIAL | PROGRAM_AUTHORISATION)
+    }
+
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         self.profile.written(entry, image);
     }

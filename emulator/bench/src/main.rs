@@ -4,11 +4,13 @@
 //! |---|---|
 //! | `operations`, `client` | the operations that are measured, and the client that makes the node carry them out |
 //! | `program`, `mailbox` | an image on the emulated core, its registers, the count |
-//! | `sizes`, `profile` | flash and RAM of an image, and the functions that its instructions belong to |
+//! | `sizes`, `modules` | flash and RAM of an image, and the code of each module |
+//! | `profile` | the functions that the instructions of an operation belong to |
 //! | `report`, `page` | the tables, and the page that states them |
 
 mod client;
 mod mailbox;
+mod modules;
 mod operations;
 mod page;
 mod profile;
@@ -44,6 +46,9 @@ struct Cli {
     /// Instead of the tables, say where the instructions of the operations are whose name contains this
     #[arg(long, value_name = "OPERATION")]
     profile: Option<String>,
+    /// Instead of the tables, print the bytes of each module of the library in our devices
+    #[arg(long)]
+    by_module: bool,
 }
 
 fn main() -> ExitCode {
@@ -59,6 +64,9 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> Result<()> {
     if let Some(operation) = &cli.profile {
         return print_profile(&cli.images.join("ours"), operation);
+    }
+    if cli.by_module {
+        return modules::print(&cli.images);
     }
     let optimisation = if cli.speed { Optimisation::Speed } else { Optimisation::Size };
     let report = Report::measure(&cli.images, optimisation)?;

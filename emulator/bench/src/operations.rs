@@ -29,10 +29,11 @@ const NO_OBJECT: u32 = 0x0602_0000;
 const IDENTITY: Multiplexer = Multiplexer { index: 0x1018, sub: 1 };
 const PARAMETER: Multiplexer = Multiplexer { index: 0x2002, sub: 0 };
 const TEXT: Multiplexer = Multiplexer { index: 0x2003, sub: 0 };
+const HANDLED: Multiplexer = Multiplexer { index: 0x2005, sub: 0 };
 const DOMAIN: Multiplexer = Multiplexer { index: 0x2004, sub: 1 };
 
 /// All operations, in the order of the table.
-pub(crate) const OPERATIONS: [Operation; 13] = [
+pub(crate) const OPERATIONS: [Operation; 14] = [
     operation("idle, one pass", [359, 343], |client| nothing(client, 0)),
     operation("idle 1 ms tick", [364, 336], |client| nothing(client, 1000)),
     operation("frame with an identifier that is not ours", [197, 148], |client| {
@@ -47,6 +48,12 @@ pub(crate) const OPERATIONS: [Operation; 13] = [
         reads(client, Multiplexer { index: 0x2222, sub: 0 }, Err(NO_OBJECT))
     }),
     operation("SDO download INTEGER32", [807, 771], |client| client.write(PARAMETER, &[1, 2, 3, 4])),
+    Operation {
+        published: [None, None],
+        ..operation("SDO download, handled by the application", [0, 0], |client| {
+            client.write(HANDLED, &[1, 2, 3, 4])
+        })
+    },
     operation("segmented upload, 32 bytes", [4321, 4076], |client| {
         reads(client, TEXT, Ok(b"thirty-two characters, no more..".to_vec()))
     }),

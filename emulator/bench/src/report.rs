@@ -50,7 +50,7 @@ impl Optimisation {
 const OTHERS: [(&str, &str); 2] = [("zencan", "zencan-node"), ("canopen-rs", "canopen-rs")];
 
 /// Our devices with fewer services: the name of the row, the image, and CANopenNode's flash.
-const DEVICES: [(&str, &str, Option<u64>); 4] = [
+pub(crate) const DEVICES: [(&str, &str, Option<u64>); 4] = [
     ("flash, minimal device", "minimal", None),
     ("flash, CANopenNode's set", "set", Some(PUBLISHED_FLASH)),
     ("flash, all services", "ours", None),

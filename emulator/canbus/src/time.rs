@@ -3,11 +3,12 @@
 use core::fmt;
 use core::ops::{Add, AddAssign, Mul, Sub};
 
-/// An instant or a span of virtual time: a count of 1/10080 microseconds since power-on.
+/// An instant or a span of virtual time: a count of 1/1008000 microseconds since power-on.
 ///
-/// A cycle of every clock in the system is a whole number of units: 168 MHz is 60, 144 MHz is 70, the 16 MHz HSI is
-/// 630, the 32 kHz LSI is 315000, a bit at 1 Mbit/s is 10080. So boards with different clocks and the bus never drift
-/// apart by rounding. 64 bits last 58 years.
+/// A cycle of every clock in the system is a whole number of units: 168 MHz is 6000, 144 MHz is 7000, the 16 MHz HSI is
+/// 63000, the 32 kHz LSI is 31500000, a bit at 1 Mbit/s is 1008000. So boards with different clocks and the bus never
+/// drift apart by rounding, and a clock that is some parts per million off is so in everything that it drives. 64 bits
+/// last half a year.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Time(pub u64);
 
@@ -17,7 +18,7 @@ impl Time {
     /// Later than any event.
     pub const NEVER: Time = Time(u64::MAX);
     /// Units in a microsecond.
-    pub const PER_MICRO: u64 = 10_080;
+    pub const PER_MICRO: u64 = 1_008_000;
     /// Units in a second.
     pub const PER_SECOND: u64 = Self::PER_MICRO * 1_000_000;
 

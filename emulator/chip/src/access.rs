@@ -132,7 +132,7 @@ impl Stm32f4 {
     fn read_unit(&mut self, unit: Unit, offset: u32, now: Time) -> Option<u32> {
         match unit {
             Unit::Rcc => self.rcc.read(offset, now),
-            Unit::Pwr => self.pwr.read(offset),
+            Unit::Pwr => self.pwr.read(offset, self.plant.supply(now)),
             Unit::Flash => self.flash.read(offset, now),
             Unit::Gpio(port) => self.ports[port].read(offset, self.outside(port, now)),
             Unit::Syscfg => self.syscfg.read(offset),
@@ -157,7 +157,9 @@ impl Stm32f4 {
             Unit::Rcc => self.write_rcc(offset, value, now),
             Unit::Pwr => self.pwr.write(offset, value),
             Unit::Flash => {
-                self.flash.write(offset, value, now, &mut self.effects).map_err(|BusFault| Refusal::Bus)?
+                let done = self.flash.write(offset, value, now, &mut self.effects);
+                self.check_flash_supply(now);
+                done.map_err(|BusFault| Refusal::Bus)?
             }
             Unit::Gpio(port) => self.ports[port].write(offset, value),
             Unit::Syscfg => self.syscfg.write(offset, value),

@@ -2,6 +2,25 @@
 
 pub use crate::spi::SsiFormat;
 
+use crate::plant::BUTTONS;
+
+/// A button of the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ButtonPin {
+    pub(crate) port: usize,
+    pub(crate) pin: u32,
+    pub(crate) pressed: bool,
+    pub(crate) released: Option<bool>,
+}
+
+impl ButtonPin {
+    /// A button at a pin of a port (`'A'` to `'H'`), its level while it is pressed, and the one that a resistor of the board
+    /// gives it otherwise.
+    pub const fn new(port: char, pin: u32, pressed: bool, released: Option<bool>) -> ButtonPin {
+        ButtonPin { port: port as usize - 'A' as usize, pin, pressed, released }
+    }
+}
+
 /// The board, and the values that the factory has set in the chip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Board {
@@ -13,6 +32,8 @@ pub struct Board {
     pub ssi: SsiFormat,
     /// The 96 bits of the unique identifier at 1FFF 7A10h.
     pub unique_id: [u32; 3],
+    /// The pins of the buttons.
+    pub buttons: [ButtonPin; BUTTONS],
     /// Flash sectors that the option bytes protect against writing, bit 0 for sector 0.
     pub write_protected: u32,
 }
@@ -24,6 +45,7 @@ impl Default for Board {
             hse: Some(8_000_000),
             encoder_lines: 1024,
             ssi: SsiFormat::default(),
+            buttons: [ButtonPin::new('C', 13, false, Some(true)), ButtonPin::new('C', 10, false, None)],
             unique_id: [0x0032_0041, 0x3336_5105, 0x3132_3839],
             write_protected: 0,
         }

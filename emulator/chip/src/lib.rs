@@ -54,6 +54,7 @@ mod timer;
 mod unmodelled;
 mod variant;
 
+pub use board::ButtonPin;
 pub use board::{Board, SsiFormat};
 pub use clocks::Clocks;
 pub use flash::Flash;

@@ -4,24 +4,21 @@
 //! |---|---|
 //! | PB5, PB6, PB7 | index, A and B of the incremental encoder: TIM3 channel 2, TIM4 channels 1 and 2 |
 //! | PB13, PB14 | clock and data of the absolute encoder: SPI2 |
-//! | PC13, PC10 | buttons to ground; the button at PC13, that of the NUCLEO, has a pull-up resistor |
+//! | those of the board | buttons: [`crate::Board::buttons`] |
 
 use canbus::Time;
 
 use crate::gpio::Outside;
 use crate::map::TIM3_CHANNEL_2;
-use crate::plant::{BUTTONS, first_change};
+use crate::plant::first_change;
 use crate::stm32f4::Stm32f4;
 
 const PORT_B: usize = 1;
-const PORT_C: usize = 2;
 const INDEX: u32 = 5;
 const PHASE_A: u32 = 6;
 const PHASE_B: u32 = 7;
 const SSI_CLOCK: u32 = 13;
 const SSI_DATA: u32 = 14;
-/// The pins of the buttons, and the level of a released button.
-const BUTTON_PINS: [(u32, Option<bool>); BUTTONS] = [(13, Some(true)), (10, None)];
 /// AF2 is TIM3 on PB5 and TIM4 on PB6 and PB7 (DS10693 table 11).
 const TIMER_FUNCTION: u32 = 2;
 /// AF5 is SPI2 on PB13 and PB14.
@@ -42,17 +39,15 @@ impl Stm32f4 {
             outside.set(PHASE_A, Some(a));
             outside.set(PHASE_B, Some(b));
         }
-        if port == PORT_C {
-            self.press(&mut outside, now);
-        }
+        self.press(port, &mut outside, now);
         outside
     }
 
     /// Applies the pressed buttons. A level that a test drives has priority.
-    fn press(&self, outside: &mut Outside, now: Time) {
-        for ((pin, released), closed) in BUTTON_PINS.into_iter().zip(self.plant.closed(now)) {
-            if outside.level(pin).is_none() {
-                outside.set(pin, if closed { Some(false) } else { released });
+    fn press(&self, port: usize, outside: &mut Outside, now: Time) {
+        for (button, closed) in self.board.buttons.into_iter().zip(self.plant.closed(now)) {
+            if button.port == port && outside.level(button.pin).is_none() {
+                outside.set(button.pin, if closed { Some(button.pressed) } else { button.released });
             }
         }
     }

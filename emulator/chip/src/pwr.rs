@@ -1,13 +1,20 @@
 //! PWR: voltage scaling, over-drive and the access to the backup domain (RM0390 section 5.4, RM0090 section 5.4).
-//! The regulators are ready at once; stop and standby modes are not entered.
+//! The regulators are ready at once; stop and standby modes are not entered. The voltage detector has its flag and no interrupt.
 
-use crate::register::{Plain, RegisterFile, bit, flag};
+use crate::register::{Plain, RegisterFile, bit, field, flag};
 use crate::variant::Variant;
 
 const CR: u32 = 0x00;
 const CSR: u32 = 0x04;
 /// CR: writes to the backup domain are enabled.
 const DBP: u32 = 8;
+/// CR: the voltage detector is on; its level, in a field of three bits.
+const PVDE: u32 = 4;
+const PLS: u32 = 5;
+/// CSR: the supply is below the level of the voltage detector.
+const PVDO: u32 = 2;
+/// The levels of the voltage detector in volts (RM0390 section 5.4.1, PLS).
+const LEVELS: [f64; 8] = [2.0, 2.1, 2.3, 2.5, 2.6, 2.7, 2.8, 2.9];
 /// CSR: the backup regulator is on. The bit is in the backup domain itself: no reset clears it.
 const BRE: u32 = 9;
 
@@ -66,9 +73,14 @@ impl Pwr {
         self.plain.write(CSR, flag(keeps, BRE));
     }
 
-    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+    pub(crate) fn read(&self, offset: u32, volts: f64) -> Option<u32> {
         let value = self.plain.read(offset)?;
-        Some(if offset == CSR { value | self.ready_bits() } else { value })
+        Some(if offset == CSR { value | self.ready_bits() | flag(self.is_low(volts), PVDO) } else { value })
+    }
+
+    fn is_low(&self, volts: f64) -> bool {
+        let control = self.plain.get(CR);
+        bit(control, PVDE) && volts < LEVELS[field(control, PLS, 3) as usize]
     }
 
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {

@@ -100,6 +100,12 @@ pub enum Breach {
         /// The HCLK cycles since the change of the divider.
         cycles: u64,
     },
+    /// An operation of the flash by words of 32 bits, with a supply below 2.7 V (RM0390 table 7, PSIZE).
+    #[error("the flash is changed by words at {millivolts} mV; words need 2700 mV")]
+    FlashSupply {
+        /// The supply.
+        millivolts: u32,
+    },
     /// A write to the backup domain while it is protected.
     #[error("{name} is written while the backup domain is protected")]
     Protected {
@@ -168,6 +174,8 @@ const CAN_TX: u32 = 9;
 const SSI_PIN: u32 = 13;
 /// The flash array (RM0390, table 4).
 const FLASH: Range<u32> = 0x0800_0000..0x0810_0000;
+/// The least supply for operations of the flash by words, in millivolts.
+const WORD_SUPPLY: u32 = 2700;
 /// HCLK cycles until new dividers of the buses are in force.
 const DIVIDER_CYCLES: u64 = 16;
 /// The inputs of ADC1 in use on the board, with their pins.
@@ -195,6 +203,13 @@ impl Stm32f4 {
         let (states, hertz) = (self.flash.wait_states(), clocks.hclk);
         let least = hertz.div_ceil(PER_WAIT_STATE).saturating_sub(1) as u32;
         self.rules.check(states >= least, Breach::WaitStates { hertz, states, least });
+    }
+
+    /// Checks the supply during an operation of the flash.
+    pub(crate) fn check_flash_supply(&mut self, now: Time) {
+        let millivolts = (self.plant.supply(now) * 1000.0) as u32;
+        let holds = millivolts >= WORD_SUPPLY || !self.flash.works_by_words(now);
+        self.rules.check(holds, Breach::FlashSupply { millivolts });
     }
 
     /// The highest HCLK, PCLK1 and PCLK2 at the current voltage scale of the core.

@@ -36,6 +36,7 @@ impl Peripherals for Stm32f4 {
         self.pass(now);
         self.flash.advance(now, &mut self.effects);
         self.flash.program(address, old, new, now, &mut self.effects)?;
+        self.check_flash_supply(now);
         self.settle(now);
         Ok(())
     }
@@ -90,7 +91,13 @@ impl Peripherals for Stm32f4 {
     }
 
     fn reset(&mut self, power: bool, now: Time) {
-        self.convert(now);
+        if power {
+            // Without a supply the watchdog has not run.
+            self.asked = None;
+            self.effects.retain(|effect| *effect != Effect::Reset);
+        } else {
+            self.convert(now);
+        }
         self.reset_all(power, now);
         self.settle(now);
     }

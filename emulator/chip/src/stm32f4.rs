@@ -186,6 +186,13 @@ impl Stm32f4 {
         self.pwr.keep_backup(true);
     }
 
+    /// Whether the supply at `now` lets the chip run. Below the level of its reset the chip stops, and starts again 0.1 V
+    /// above it.
+    pub fn is_supplied(&self, now: Time, is_running: bool) -> bool {
+        let hysteresis = if is_running { 0.0 } else { 0.1 };
+        self.plant.supply(now) >= self.flash.reset_level() + hysteresis
+    }
+
     pub(crate) fn backup_is_kept(&self, now: Time) -> bool {
         self.pwr.keeps_backup() && self.plant.has_battery(now)
     }

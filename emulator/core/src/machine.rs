@@ -21,6 +21,9 @@ use crate::scb::cfsr;
 use crate::stats::Stats;
 use crate::stepping::{self, Stepping};
 
+/// The begin of the core's system space (ARMv7-M, B3.1).
+const PRIVATE: u32 = 0xE000_0000;
+
 /// The reason why [`Machine::run_until`] returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
@@ -147,6 +150,29 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// [`BusFault`] where there is no memory.
     pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), BusFault> {
         engine::store(&mut self.cpu, address, bytes).map_err(|_| BusFault)
+    }
+
+    /// Reads a word as a debug probe does, while the program runs: memory, the core's registers in the system space, or a
+    /// peripheral. `None` where nothing answers.
+    pub fn debug_read(&mut self, address: u32) -> Option<u32> {
+        let mut bytes = [0; 4];
+        if Machine::read(self, address, &mut bytes).is_ok() {
+            return Some(u32::from_le_bytes(bytes));
+        }
+        let core = self.cpu.get_data_mut();
+        if (PRIVATE..).contains(&address) {
+            return core.ppb_read(address, 0);
+        }
+        core.chip.read(address, 4, core.now).ok()
+    }
+
+    /// Writes a word of the system space or of a peripheral, as a debug probe does. `None` where nothing answers.
+    pub fn debug_write(&mut self, address: u32, value: u32) -> Option<()> {
+        let core = self.cpu.get_data_mut();
+        if (PRIVATE..).contains(&address) {
+            return core.ppb_write(address, value);
+        }
+        core.chip.write(address, 4, value, core.now).ok()
     }
 
     /// Sets a core register, as a debugger does: 0 to 12, 13 the stack pointer, 14 the link register, 15 the program

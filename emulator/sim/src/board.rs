@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
-use chip::plant::FaultKind;
+use chip::plant::{FaultKind, Signal};
 use chip::{FLASH_BASE, Stm32f4};
 use emulator::{Incident, Machine, Model, Stop};
 use update::HEADER_LEN;
@@ -67,6 +67,8 @@ pub struct Board {
     log: Log,
     /// The address at which the core has locked up; a watchdog resets it.
     locked_up: Option<u32>,
+    /// Whether the supply was above the level of the chip's reset.
+    is_supplied: bool,
 }
 
 impl Board {
@@ -109,6 +111,7 @@ impl Board {
             programs,
             log: Log::default(),
             locked_up: None,
+            is_supplied: true,
         })
     }
 
@@ -134,9 +137,24 @@ impl Board {
 
     /// Runs to `limit`, or to the request of a frame if that comes first; returns the instant reached.
     pub(crate) fn run_until(&mut self, limit: Time) -> Time {
+        let limit = self.follow_supply(limit);
         let stop = self.machine.run_until(limit);
         self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
         if stop == Stop::Poked { limit.min(self.machine.now()) } else { limit }
+    }
+
+    /// Switches the chip on or off where the supply crosses the level of its reset. Returns the instant of the next look
+    /// at a supply that changes, or `limit`.
+    fn follow_supply(&mut self, limit: Time) -> Time {
+        const LOOK: Time = Time::from_micros(100);
+        let (now, chip) = (self.machine.now(), self.machine.peripherals());
+        let is_steady = matches!(chip.plant().supply_signal(), Signal::Constant(_));
+        let is_supplied = chip.is_supplied(now, self.is_supplied);
+        if is_supplied != self.is_supplied {
+            self.is_supplied = is_supplied;
+            if is_supplied { self.machine.power_on(now) } else { self.machine.power_off() }
+        }
+        if is_steady { limit } else { limit.min(now + LOOK) }
     }
 
     /// Core, memory and chip.
@@ -166,6 +184,7 @@ impl Board {
             pressure: knob(plant.pressure_signal(), plant.pressure(now)),
             temperature: knob(plant.temperature_signal(), plant.temperature(now)),
             thermistor: knob(plant.thermistor_signal(), plant.thermistor(now)),
+            supply: knob(plant.supply_signal(), plant.supply(now)),
             shaft: knob(plant.motion(), plant.revolutions(now)),
             buttons: plant.held(),
             faults: plant.faults(now).map(FaultKind::name).collect(),

@@ -99,6 +99,10 @@ pub struct Options {
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("thermistor", text))]
     pub thermistor: Vec<Targeted<Stimulus>>,
 
+    /// Supply of the chip in V, e.g. ramp:3.3,1.7,2.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("supply", text))]
+    pub supply: Vec<Targeted<Stimulus>>,
+
     /// The encoder's shaft in revolutions, or its speed, e.g. const:0.25 or rpm:6000.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
     pub shaft: Vec<Targeted<Stimulus>>,

@@ -16,7 +16,7 @@ pub enum Command {
 }
 
 /// The syntax of the commands.
-pub const HELP: &str = "commands: pressure|temperature|thermistor|shaft|button|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
+pub const HELP: &str = "commands: pressure|temperature|thermistor|supply|shaft|button|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
 
 /// Parses one line; `None` for an empty line.
 pub fn parse(line: &str) -> Option<Result<Command, String>> {
@@ -26,7 +26,7 @@ pub fn parse(line: &str) -> Option<Result<Command, String>> {
         "" => return None,
         "quit" if rest.is_empty() => Ok(Command::Quit),
         "help" => Err(HELP.to_owned()),
-        "pressure" | "temperature" | "thermistor" | "shaft" | "button" | "fault" => {
+        "pressure" | "temperature" | "thermistor" | "supply" | "shaft" | "button" | "fault" => {
             Stimulus::parse(word, rest.trim()).map(Command::Stimulus)
         }
         _ => Err(format!("{word:?} is no command; {HELP}")),

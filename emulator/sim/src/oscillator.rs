@@ -2,8 +2,6 @@
 
 use std::str::FromStr;
 
-use chip::Board;
-
 /// Largest error in ppm: 2 %.
 const MOST: i32 = 20_000;
 
@@ -12,9 +10,9 @@ const MOST: i32 = 20_000;
 pub struct Oscillator(i32);
 
 impl Oscillator {
-    /// The frequency of the board's oscillator.
-    pub(crate) fn hertz(self) -> Option<u64> {
-        let nominal = Board::default().hse?;
+    /// The frequency of the board's oscillator, with its nominal frequency.
+    pub(crate) fn hertz(self, nominal: u32) -> Option<u64> {
+        let nominal = u64::from(nominal);
         nominal.checked_add_signed(i64::try_from(nominal).ok()? * i64::from(self.0) / 1_000_000)
     }
 }
@@ -35,7 +33,7 @@ mod tests {
 
     #[test]
     fn parts_per_million_of_eight_megahertz() {
-        let hertz = |text: &str| text.parse::<Oscillator>().unwrap().hertz();
+        let hertz = |text: &str| text.parse::<Oscillator>().unwrap().hertz(8_000_000);
         assert_eq!(
             (hertz("0"), hertz("50"), hertz("-3000")),
             (Some(8_000_000), Some(8_000_400), Some(7_976_000))

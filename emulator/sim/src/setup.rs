@@ -4,7 +4,8 @@ use std::ops::Range;
 use std::rc::Rc;
 
 use anyhow::{Context, Result, ensure};
-use chip::{Board as Wiring, Stm32f4};
+use bsp::boards::{Button, Chip, Pull};
+use chip::{Board as Wiring, ButtonPin, Stm32f4, Variant};
 use storage::{DeviceRecord, Memory, Pages};
 
 use crate::board::{Board, Contents, Images};
@@ -44,8 +45,8 @@ pub fn world(options: &Options) -> Result<World> {
     for oscillator in &options.oscillator {
         ensure!(options.nodes.iter().any(|node| oscillator.is_for(node.id)), "an oscillator is for nobody");
     }
-    let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
-    let stimuli = [pressure, temperature, thermistor, shaft, button, fault].into_iter().flatten();
+    let Options { pressure, temperature, thermistor, supply, shaft, button, fault, .. } = options;
+    let stimuli = [pressure, temperature, thermistor, supply, shaft, button, fault].into_iter().flatten();
     for stimulus in stimuli {
         world.apply(stimulus).context("a stimulus is for nobody")?;
     }
@@ -69,9 +70,27 @@ fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
 /// The chip of a board, with its clock and its own unique identifier, from which the firmware derives the serial
 /// number.
 fn chip(node: &Node, options: &Options) -> Stm32f4 {
-    let mut wiring = Wiring { hse: oscillator(node, options).hertz(), ..Wiring::default() };
+    let oscillator = oscillator(node, options);
+    let board = image_board(options.chip);
+    let buttons = board.buttons.map(|Button { pin, pull, pressed }| {
+        // Without a resistor of the chip, the board has one.
+        let released = (pull == Pull::None).then_some(!pressed);
+        ButtonPin::new(pin.port, pin.number.into(), pressed, released)
+    });
+    let mut wiring = Wiring { hse: oscillator.hertz(board.oscillator.hertz), buttons, ..Wiring::default() };
     wiring.unique_id[0] = node.id.into();
     Stm32f4::new(options.chip, wiring)
+}
+
+/// The board that the images for a chip are built for: the same description as theirs.
+fn image_board(chip: Variant) -> bsp::boards::Board {
+    let wanted = match chip {
+        Variant::F446 => Chip::F446,
+        Variant::F405 => Chip::F405,
+        Variant::F407 => Chip::F407,
+    };
+    let found = bsp::boards::ALL.into_iter().find(|(_, board)| board.chip == wanted);
+    found.map_or(*bsp::boards::ALL[0].1, |(_, board)| *board)
 }
 
 /// The last oscillator error on the command line that applies to the board.

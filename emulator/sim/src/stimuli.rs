@@ -19,6 +19,8 @@ pub enum Stimulus {
     Temperature(Signal),
     /// The temperature of the thermistor, in K.
     Thermistor(Signal),
+    /// The supply of the chip, in V.
+    Supply(Signal),
     /// The position of the shaft in revolutions, or its speed.
     Shaft(Motion),
     /// A button is pressed or released.
@@ -30,7 +32,7 @@ pub enum Stimulus {
 }
 
 impl Stimulus {
-    /// Parses `[ID=]SPEC` of a kind: pressure, temperature, thermistor, shaft, button or fault.
+    /// Parses `[ID=]SPEC` of a kind: pressure, temperature, thermistor, supply, shaft, button or fault.
     ///
     /// # Errors
     /// One line that describes the error.
@@ -39,6 +41,7 @@ impl Stimulus {
             "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
             "temperature" => in_kelvin(text).map(|spec| spec.map(Stimulus::Temperature)),
             "thermistor" => in_kelvin(text).map(|spec| spec.map(Stimulus::Thermistor)),
+            "supply" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Supply)),
             "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
             "button" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Button)),
             "fault" if text.ends_with(":on") || text.ends_with(":off") => {
@@ -46,7 +49,7 @@ impl Stimulus {
             }
             "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
             _ => Err(format!(
-                "{kind:?} is no stimulus; there are pressure, temperature, thermistor, shaft, button and fault"
+                "{kind:?} is no stimulus; there are pressure, temperature, thermistor, supply, shaft, button and fault"
             )),
         }
     }
@@ -57,6 +60,7 @@ impl Stimulus {
             Stimulus::Pressure(signal) => plant.set_pressure(signal, now),
             Stimulus::Temperature(signal) => plant.set_temperature(signal, now),
             Stimulus::Thermistor(signal) => plant.set_thermistor(signal, now),
+            Stimulus::Supply(signal) => plant.set_supply(signal, now),
             Stimulus::Shaft(motion) => plant.set_shaft(motion, now),
             Stimulus::Button(push) => plant.push(push, now),
             Stimulus::Fault(fault) => plant.add_fault(fault),
@@ -80,6 +84,8 @@ pub struct BoardStimuli {
     pub temperature: Knob,
     /// The temperature of the thermistor, in K.
     pub thermistor: Knob,
+    /// The supply of the chip, in V.
+    pub supply: Knob,
     /// The position of the shaft, in revolutions.
     pub shaft: Knob,
     /// The buttons that are held down.

@@ -1,6 +1,7 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images --development` builds them.
 
 mod adapter;
+mod bringup;
 mod budget;
 mod bus_faults;
 mod calibration;
@@ -34,6 +35,7 @@ mod sensor_faults;
 mod silicon;
 mod stack;
 mod start_up;
+mod supply;
 mod support;
 mod timing;
 mod update;

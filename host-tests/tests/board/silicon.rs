@@ -3,6 +3,7 @@
 
 use canbus::Time;
 use chip::Loss;
+use object::{Object, ObjectSection, ObjectSymbol};
 use sim::world::World;
 
 use crate::chip_faults::{peek, poke};
@@ -15,6 +16,8 @@ const PORT_A: u32 = 0x4002_0000;
 const PORT: u32 = 0x400;
 const OSPEEDR: u32 = 0x08;
 const PUPDR: u32 = 0x0C;
+/// 2001h:1.
+const LOST_FRAMES: (u16, u8) = (0x2001, 1);
 /// 2001h:9.
 const CAN_RESETS: (u16, u8) = (0x2001, 9);
 
@@ -97,4 +100,57 @@ fn a_controller_that_does_not_leave_the_bus_is_reset() {
     assert_eq!(summary.nodes[0].heard.boot_ups, 2, "{summary}");
     assert_eq!(read(&mut world, &master, CAN_RESETS), 1);
     assert!(log(&mut world).contains("lost events of kind 9: 1"));
+}
+
+/// A FIFO that releases no mailbox for 20 ms: the interrupt does not wait for it, the node goes on and counts it.
+#[test]
+fn a_mailbox_that_is_released_late_costs_no_reset() {
+    const LATE: u32 = 36_000 * 20;
+    let mut world = running();
+    let master = Master::join(&mut world);
+    let lost = read(&mut world, &master, LOST_FRAMES);
+    world.machine(0).peripherals_mut().can1_mut().release_after(LATE);
+    master.send(&mut world, 0x000, &[1, 1]);
+    world.run_until(world.now() + Time::from_millis(15));
+    world.machine(0).peripherals_mut().can1_mut().release_after(0);
+    let summary = run(&mut world, SECOND);
+    assert!(summary.nodes[0].incidents.is_empty(), "{summary}");
+    assert_eq!(summary.nodes[0].heard.boot_ups, 1, "{summary}");
+    assert!(read(&mut world, &master, LOST_FRAMES) > lost, "{summary}");
+}
+
+/// Each wait for a flag of the hardware has a bound: no loop has a register in its condition, and a loop without a
+/// condition compares the time.
+#[test]
+fn no_wait_for_a_register_is_without_a_bound() {
+    let sources = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/bsp/src/hardware");
+    let mut unbounded = Vec::new();
+    for file in std::fs::read_dir(sources).unwrap().map(|file| file.unwrap().path()) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for (number, line) in (1..).zip(&lines) {
+            let asks_register = line.trim_start().starts_with("while ") && line.contains("read()");
+            let body =
+                || lines[number..].iter().take_while(|next| next.trim() != "}" || next.starts_with("     "));
+            let has_no_end = line.trim() == "loop {" && !body().any(|next| next.contains(">= latest"));
+            if asks_register || has_no_end {
+                unbounded.push(format!("{}:{number}: {}", file.display(), line.trim()));
+            }
+        }
+    }
+    assert_eq!(unbounded, [""; 0]);
+}
+
+/// The control block of the log lies where the bootloader has nothing, so a debug probe reads on through a reset.
+#[test]
+fn the_log_of_the_application_survives_the_bootloader() {
+    let firmware = std::fs::read(images().join("firmware")).unwrap();
+    let elf = object::File::parse(&*firmware).unwrap();
+    let block = elf.symbols().find(|symbol| symbol.name() == Ok("_SEGGER_RTT")).expect("a log").address();
+    let bootloader = std::fs::read(images().join("bootloader")).unwrap();
+    let elf = object::File::parse(&*bootloader).unwrap();
+    let end = elf.sections().map(|section| section.address() + section.size());
+    // The retained words at the end of RAM belong to both.
+    let end = end.filter(|end| (0x2000_0000..0x2001_FF00).contains(end)).max().unwrap();
+    assert!(block >= end, "the log at {block:#x}, the bootloader up to {end:#x}");
 }

@@ -161,7 +161,7 @@ fn provoke_on_bus(bench: &mut Bench, fault: canopen::Fault) {
             store(bench, group, 5);
             return lose_stored(bench, group);
         }
-        Fault::Application(_) => unreachable!("the node names its own"),
+        _ => unreachable!("the node names its own, and has no life guarding"),
     }
     (0..1000).for_each(|_| bench.sample(&intact()));
 }

@@ -133,7 +133,8 @@ fn the_application_starts_where_vtor_may_point() {
 fn the_stack_is_at_the_very_start_of_ram() {
     let regions = regions();
     assert_eq!(regions["STACK"].start, RAM.start);
-    assert_eq!(regions["STACK"].end, regions["RAM"].start);
-    assert_eq!(regions["RAM"].end, regions["RETAINED"].start);
+    assert_eq!(regions["STACK"].end, regions["LOADER_RAM"].start);
+    assert_eq!(regions["LOADER_RAM"].end, regions["NODE_RAM"].start);
+    assert_eq!(regions["NODE_RAM"].end, regions["RETAINED"].start);
     assert_eq!(regions["RETAINED"].end, RAM.end);
 }

@@ -58,6 +58,9 @@ fn run(cli: &Cli) -> Result<()> {
     let second = cli.second_key.as_deref().map(key::public).transpose()?;
     let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, second)?;
     println!("{content}");
+    if !cli.dry_run {
+        probe::check_version().map_err(anyhow::Error::msg)?;
+    }
     let image = cli.application.with_extension("flash.img");
     std::fs::write(&image, content.image().to_bytes())
         .with_context(|| format!("cannot write {}", image.display()))?;

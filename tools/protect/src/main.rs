@@ -63,6 +63,9 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> Result<()> {
+    if !cli.dry_run {
+        probe::check_version().map_err(anyhow::Error::msg)?;
+    }
     let mut probe = Probe::new(cli.board.clone());
     let has = if cli.dry_run { cli.pretended() } else { current(&mut probe)? };
     println!("now   {has}");

@@ -54,7 +54,11 @@ impl Registers for Probe {
 }
 
 fn answer(mut command: Command) -> Result<String, ProbeError> {
-    let output = command.stderr(Stdio::inherit()).output().map_err(ProbeError::Start)?;
+    let mut output = command.stderr(Stdio::inherit()).output().map_err(ProbeError::Start)?;
+    if !output.status.success() {
+        // A core that sleeps, or a program that switches the pins of the probe off.
+        output = command.arg("--connect-under-reset").output().map_err(ProbeError::Start)?;
+    }
     if !output.status.success() {
         return Err(ProbeError::Failed(line(&command), output.status));
     }

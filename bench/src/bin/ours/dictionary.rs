@@ -79,6 +79,7 @@ pub(crate) const ROWS: &[Object] = canopen::rows!(
             .default(DefaultValue::Text("thirty-two characters, no more..")),
         Object::highest(0x2004, 1, ""),
         Object::new(0x2004, 1, "", Type::Domain, Access::ReadWrite),
+        Object::new(0x2005, 0, "", Type::Integer32, Access::ReadWrite).handled(),
     ],
 );
 

@@ -11,6 +11,9 @@ const BASE: *const Slots = 0x4002_4000 as *const Slots;
 
 const _: () = assert!(size_of::<Slots>() <= 4096);
 
+/// The highest level of the voltage detector, 2.9 V.
+const PLS_2_9_V: u8 = 7;
+
 /// The memory with two copies of its content: see [`BackupCopies`].
 pub struct BackupMemory {
     power: PWR,
@@ -57,6 +60,8 @@ impl BackupMemory {
         rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
         protect(&power, false);
         power.csr().modify(|_, w| w.bre().set_bit());
+        // SAFETY: PLS takes any level; this one is 2.9 V (RM0390, 5.4.1).
+        power.cr().modify(|_, w| unsafe { w.pls().bits(PLS_2_9_V).pvde().set_bit() });
         protect(&power, true);
         // SAFETY: the memory exists, is on and aligned, and any bits in it are valid numbers. `power` is given to this
         // function only, and once, so nothing else refers to the memory.
@@ -75,6 +80,13 @@ impl BackupMemory {
             self.losses.count(Event::BackupWrite);
         }
     }
+}
+
+/// Whether the supply is above the level of the voltage detector, which [`BackupMemory::open`] sets: the flash is changed
+/// by words, which need 2.7 V (RM0390, table 7).
+pub(super) fn is_supplied() -> bool {
+    // SAFETY: a read of a flag.
+    unsafe { (*PWR::ptr()).csr().read().pvdo().bit_is_clear() }
 }
 
 /// Sets DBP. The bus of PWR is slower than the bus of the memory, so the register is read back to wait until the write

@@ -19,17 +19,6 @@ use crate::backup_copies::BackupState;
 use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
-/// Name of the board, object 1009h.
-#[cfg(feature = "stm32f446")]
-pub const NAME: &str = "NUCLEO-F446RE";
-/// Name of the board, object 1009h.
-#[cfg(not(feature = "stm32f446"))]
-pub const NAME: &str = "STM32F405/407";
-
-/// Whether the board feeds a clock into OSC_IN, as the ST-LINK of a NUCLEO does; otherwise it has a crystal of 8 MHz.
-/// A property of the board, not of the chip: a board of one's own sets it here. With the wrong value HSE does not start.
-pub(super) const HSE_IS_BYPASSED: bool = cfg!(feature = "stm32f446");
-
 /// All parts of the board that the application uses.
 pub struct Board {
     /// Why the chip was reset.
@@ -104,9 +93,7 @@ impl Board {
         };
         let ssi = Ssi::new(absolute, losses, &mut rcc);
         let (backup, backup_state) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
-        let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
-        let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
-        let led = Led::new(gpioa.pa5);
+        let (buttons, lamps, led) = (Buttons::new(&rcc), Lamps::new(&rcc), Led::new(&rcc));
         idle_pins::make_analogue(&rcc);
         let parameters = ParameterFlash::new(Flash::new(device.FLASH), losses);
         Board {

@@ -12,10 +12,12 @@ use stm32f4xx_hal::gpio::{PB8, PB9, Speed};
 use stm32f4xx_hal::pac::{CAN1, RCC, can1};
 use stm32f4xx_hal::rcc::Rcc;
 
+use super::gpio::output_of;
 use super::time_base::Clock;
 use super::transmit::Transmitter;
 use crate::bit_rate_detection::Heard;
 use crate::bit_timing::BitTiming;
+use crate::boards::BOARD;
 use crate::bus_state::BusState;
 use crate::filters::{self, BANKS, Bank, Fifo, Pair};
 use crate::losses::{Event, Losses};
@@ -61,7 +63,8 @@ impl Controller {
     /// controller does not change is counted in `losses`.
     ///
     /// TX has medium speed: at low speed its edges take up to 100 ns, a tenth of a bit at 1 Mbit/s (STM32F446 datasheet,
-    /// I/O AC characteristics). RX is pulled up, so that without a transceiver the bus is recessive.
+    /// I/O AC characteristics). RX is pulled up, so that without a transceiver the bus is recessive. The transceiver is
+    /// awake from here on.
     pub(crate) fn new(
         can: CAN1,
         tx: PB9,
@@ -69,6 +72,7 @@ impl Controller {
         losses: &'static Losses,
         rcc: &mut Rcc,
     ) -> (Controller, Transmitter) {
+        <output_of!(BOARD.standby)>::new(rcc);
         let tx = tx.into_alternate::<9>().speed(Speed::Medium);
         let rx = rx.into_alternate::<9>().internal_pull_up(true);
         let pins = Pins::new(can, (tx, rx), rcc);

@@ -30,6 +30,8 @@ pub enum Error {
     Flags(u32),
     /// The controller is busy for longer than any operation takes.
     Busy,
+    /// The supply is too low to change the flash.
+    Supply,
 }
 
 impl From<NorFlashErrorKind> for Error {
@@ -42,7 +44,7 @@ impl NorFlashError for Error {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
             Error::Place(kind) => *kind,
-            Error::Flags(_) | Error::Busy => NorFlashErrorKind::Other,
+            Error::Flags(_) | Error::Busy | Error::Supply => NorFlashErrorKind::Other,
         }
     }
 }

@@ -1,28 +1,24 @@
 //! Pins without a function. A floating input may draw current and pick up noise, so they become analogue, which
 //! switches their input stage off (AN4899, unused pins). Pins that the package lacks count as well.
 
-use stm32f4xx_hal::pac::{GPIOA, RCC, gpioa};
+use stm32f4xx_hal::pac::RCC;
 
-/// Pins that stay: those of the board, and those of the debug port, which have pull resistors (RM0390, 7.3.1).
-const KEPT: [u16; PORTS] = [
-    // PA0, PA1, PA5, PA13 to PA15.
-    0b1110_0000_0010_0011,
-    // PB3 to PB9, PB13, PB14.
-    0b0110_0011_1111_1000,
-    // PC0 to PC2, PC10, PC13.
-    0b0010_0100_0000_0111,
-    0,
-    0,
-    0,
-    0,
-    0,
-];
+use super::gpio::port;
+use crate::boards::BOARD;
+
 /// Ports A to H.
-const PORTS: usize = 8;
-/// Distance of two ports in bytes (RM0390, table 1).
-const STEP: usize = 0x400;
+const PORTS: [char; 8] = ['A', 'B', 'C', 'D', 'E', 'F', 'G', 'H'];
+/// Pins that stay: those of the board, and those of the debug port, which have pull resistors (RM0390, 7.3.1).
+const KEPT: [u16; PORTS.len()] = {
+    let (mut kept, mut at) = ([0; PORTS.len()], 0);
+    while at < PORTS.len() {
+        kept[at] = BOARD.pins(PORTS[at]);
+        at += 1;
+    }
+    kept
+};
 /// AHB1ENR: the clocks of all ports.
-const CLOCKS: u32 = (1 << PORTS) - 1;
+const CLOCKS: u32 = (1 << PORTS.len()) - 1;
 
 /// Makes the pins analogue. To be called when the pins of the board have their functions.
 pub(super) fn make_analogue(rcc: &RCC) {
@@ -30,12 +26,9 @@ pub(super) fn make_analogue(rcc: &RCC) {
     // SAFETY: the bits of the ports, in the order of their addresses.
     rcc.ahb1enr().write(|w| unsafe { w.bits(before | CLOCKS) });
     let _ = rcc.ahb1enr().read();
-    for (port, kept) in KEPT.iter().enumerate() {
-        let first: *const gpioa::RegisterBlock = GPIOA::ptr();
-        // SAFETY: all ports have the same registers, STEP bytes apart. The owners of the pins change theirs only.
-        let port = unsafe { &*first.byte_add(port * STEP) };
+    for (letter, kept) in PORTS.into_iter().zip(KEPT) {
         // SAFETY: MODER takes any value.
-        port.moder().modify(|r, w| unsafe { w.bits(r.bits() | analogue(!kept)) });
+        port(letter).moder().modify(|r, w| unsafe { w.bits(r.bits() | analogue(!kept)) });
     }
     // SAFETY: as above.
     rcc.ahb1enr().write(|w| unsafe { w.bits(before) });

@@ -1,27 +1,23 @@
-//! The status LED of the NUCLEO, LD2.
+//! The status LED.
 
-use stm32f4xx_hal::gpio::{Output, PA5};
-use stm32f4xx_hal::pac::{GPIOA, RCC};
+use stm32f4xx_hal::pac::RCC;
+
+use super::gpio::output_of;
+use crate::boards::BOARD;
+
+/// The pin of the LED.
+pub(super) type Pin = output_of!(BOARD.led);
 
 /// The LED.
-pub struct Led(PA5<Output>);
+pub struct Led(Pin);
 
 impl Led {
-    pub(crate) fn new(pin: PA5) -> Led {
-        Led(pin.into_push_pull_output())
+    pub(crate) fn new(rcc: &RCC) -> Led {
+        Led(Pin::new(rcc))
     }
 
     /// Switches the LED.
     pub fn set(&mut self, on: bool) {
-        self.0.set_state(on.into());
+        self.0.set(on);
     }
-}
-
-/// Changes the LED before any pin has an owner, while the node waits for its clock.
-pub(super) fn flicker(rcc: &RCC) {
-    rcc.ahb1enr().modify(|_, w| w.gpioaen().set_bit());
-    // SAFETY: nobody has the pins yet.
-    let port = unsafe { &*GPIOA::ptr() };
-    port.moder().modify(|_, w| w.moder5().output());
-    port.odr().modify(|r, w| w.odr5().bit(r.odr5().bit_is_clear()));
 }

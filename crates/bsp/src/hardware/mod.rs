@@ -14,6 +14,7 @@ pub mod factory;
 mod fault;
 pub mod flash;
 mod front_end;
+mod gpio;
 mod idle_pins;
 pub mod led;
 pub mod loader;

@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
 use super::flash::{Error, Flash};
-use super::memory;
+use super::{backup, memory};
 use crate::flash_area::FlashArea;
 use crate::losses::{Event, Losses};
 use crate::sectors;
@@ -28,8 +28,18 @@ impl ParameterFlash {
 
     /// Programs in another area of the flash.
     pub(super) fn write_in(&mut self, area: &FlashArea, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.admit()?;
         let written = self.flash.write(area, offset, bytes);
         self.noted(written)
+    }
+
+    /// Refuses a change while the supply is low.
+    fn admit(&self) -> Result<(), Error> {
+        if backup::is_supplied() {
+            return Ok(());
+        }
+        self.losses.count(Event::Supply);
+        Err(Error::Supply)
     }
 
     fn noted(&self, result: Result<(), Error>) -> Result<(), Error> {
@@ -63,6 +73,7 @@ impl NorFlash for ParameterFlash {
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
         let len = to.checked_sub(from).ok_or(NorFlashErrorKind::OutOfBounds)?;
         let start = self.area.address(from, len as usize, memory::PARAMETER_PAGE)?;
+        self.admit()?;
         for address in (start..start + len).step_by(Self::ERASE_SIZE) {
             let sector = sectors::starting_at(address).ok_or(NorFlashErrorKind::NotAligned)?;
             let erased = self.flash.erase(sector.number);
@@ -73,6 +84,7 @@ impl NorFlash for ParameterFlash {
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.admit()?;
         let written = self.flash.write(&self.area, offset, bytes);
         self.noted(written)
     }

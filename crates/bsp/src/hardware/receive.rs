@@ -13,6 +13,9 @@ use crate::mailbox::Mailbox;
 /// of the densest traffic.
 const CAPACITY: usize = 32;
 
+/// Number of polls for a mailbox to be released, 100 us at least. The slowest known chip takes 17 us.
+const RELEASE_POLLS: u32 = 2_000;
+
 /// The queue between the interrupt and the task.
 pub type ReceiveQueue<const N: usize = CAPACITY> = Queue<Received, N>;
 
@@ -69,11 +72,12 @@ impl Receiver {
             state.write(|w| w.fovr().clear());
             self.count(true);
         }
-        (now.fmp().bits() > 0).then(|| self.release())
+        if now.fmp().bits() > 0 { self.release() } else { None }
     }
 
-    /// Reads the oldest frame and releases its place.
-    fn release(&mut self) -> Mailbox {
+    /// Reads the oldest frame and releases its place. A place that is not released is counted, and its frame is read again
+    /// by the next interrupt; a FIFO that never releases one ends in a reset by the watchdog.
+    fn release(&mut self) -> Option<Mailbox> {
         let output = registers().rx(self.fifo as usize);
         let mailbox = Mailbox {
             rir: output.rir().read().bits(),
@@ -83,8 +87,12 @@ impl Receiver {
         };
         registers().rfr(self.fifo as usize).write(|w| w.rfom().set_bit());
         // The next frame is at the output once the hardware has cleared the request, a few clocks later.
-        while registers().rfr(self.fifo as usize).read().rfom().bit_is_set() {}
-        mailbox
+        let is_released =
+            (0..RELEASE_POLLS).any(|_| registers().rfr(self.fifo as usize).read().rfom().bit_is_clear());
+        if !is_released {
+            self.count(true);
+        }
+        is_released.then_some(mailbox)
     }
 
     fn count(&self, lost: bool) {

@@ -8,6 +8,7 @@ use stm32f4xx_hal::gpio::{Analog, PA0, PA1, PC2};
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2, TIM3};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
+use crate::boards::{BOARD, Chip};
 use crate::losses::{Event, Losses};
 pub(super) use crate::oversampling::SCANS;
 use crate::oversampling::{CHANNELS, WORDS, sums};
@@ -26,10 +27,10 @@ const HALF: usize = SCANS * CHANNELS;
 const PERIOD: u16 = 4500;
 
 /// Channel of the temperature sensor (RM0390, 13.10; RM0090, 13.10).
-#[cfg(feature = "stm32f446")]
-const TEMPERATURE: u8 = 18;
-#[cfg(not(feature = "stm32f446"))]
-const TEMPERATURE: u8 = 16;
+const TEMPERATURE: u8 = match BOARD.chip {
+    Chip::F446 => 18,
+    Chip::F405 | Chip::F407 => 16,
+};
 
 /// A channel and its sampling time.
 #[derive(Clone, Copy)]

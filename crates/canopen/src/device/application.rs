@@ -1,10 +1,12 @@
 //! The interface between a device and the application code of the product.
 
 use super::{Soundness, Stored};
+use crate::NodeId;
 use crate::dictionary::{Entry, Group, Groups};
-use crate::emcy::{Condition, Fault};
+use crate::emcy::{Condition, ErrorClass, Fault};
 use crate::nmt::State;
-use crate::sdo::{Abort, Multiplexer};
+use crate::sdo::{Abort, Multiplexer, Part};
+use crate::time_stamp::TimeOfDay;
 
 /// The application code of a product: the behaviour behind the objects. Every method has a default that does nothing,
 /// so an application implements only the methods that it needs.
@@ -15,10 +17,25 @@ pub trait Application {
     /// The faults of the application, at most 32. [`Fault::Application`] names a fault by its position in this list.
     const CONDITIONS: &'static [Condition] = &[];
 
+    /// Whether the upper half of an entry of 1003h has the first two bytes of the error field of its EMCY. Otherwise it
+    /// is 0.
+    const LISTS_DETAIL: bool = false;
+
     /// Whether clients may upload in blocks (CiA 301, 7.2.4.3.12, optional). A device that is short of flash and has no
     /// long entry can switch block uploads off: the request is then refused with [`Abort::Command`], and the client
     /// uploads in segments.
     const BLOCK_UPLOAD: bool = true;
+
+    /// Whether clients may download in blocks (CiA 301, 7.2.4.3.9, optional). Otherwise the request is refused with
+    /// [`Abort::Command`], and the client downloads in segments.
+    const BLOCK_DOWNLOAD: bool = true;
+
+    /// Whether SDO requests of less than eight bytes are taken, as if zeros followed. CiA 301, 7.2.4.3, demands eight
+    /// bytes, but some older controllers send less. Otherwise such a request is ignored.
+    const SHORT_REQUESTS: bool = false;
+
+    /// Whether the device has an LSS slave (CiA 305, optional). Without one, the device needs a node-ID from its caller.
+    const LSS: bool = true;
 
     /// The bits of the error register (1001h) that the device supports. Bit 0, the generic error, must be one of them
     /// (CiA 301, 7.5.2.2).
@@ -31,12 +48,27 @@ pub trait Application {
     fn initialise(&mut self, _image: &mut [u8]) {}
 
     /// Decides on a write to an entry that is [`handled`](crate::dictionary::Object::handled), by SDO or by an RPDO.
-    /// Type and limits are checked already, and the device stores the bytes. The method may change other values, and
-    /// bit 31 of the COB-ID of a PDO: after a write by SDO, the device switches the PDO on or off accordingly.
+    /// Type and limits are checked already, and the device stores the bytes. The method may change other values.
     ///
     /// # Errors
     /// The reason to refuse the write; nothing is stored then.
     fn write(&mut self, _entry: &Entry, _bytes: &[u8], _image: &mut [u8]) -> Result<(), Abort> {
+        Ok(())
+    }
+
+    /// Whether a write to this [`handled`](crate::dictionary::Object::handled) entry can change bit 31 of the COB-ID of a
+    /// PDO, or the result of [`broadcasts`](Application::broadcasts). After such a write by SDO, the device switches its
+    /// PDOs on or off accordingly. This takes time in proportion to the number of PDOs.
+    fn switches_pdos(&self, _entry: &Entry) -> bool {
+        false
+    }
+
+    /// An SDO client reads this entry. The method may set its value in `image`, or refuse the upload. A domain asks
+    /// [`read_domain`](Application::read_domain) instead.
+    ///
+    /// # Errors
+    /// The reason to refuse the upload.
+    fn read(&mut self, _entry: &Entry, _image: &mut [u8]) -> Result<(), Abort> {
         Ok(())
     }
 
@@ -51,8 +83,22 @@ pub trait Application {
     /// TPDOs are sent when the method returns. `counter` is `None` where 1019h asks for no counter.
     fn synchronised(&mut self, _counter: Option<u8>, _image: &mut [u8]) {}
 
+    /// A time stamp has arrived.
+    fn time(&mut self, _time: TimeOfDay, _image: &mut [u8]) {}
+
     /// The NMT state has changed.
     fn state(&mut self, _state: State, _image: &mut [u8]) {}
+
+    /// The error field of the EMCY of a fault of the application, by its number in
+    /// [`CONDITIONS`](Application::CONDITIONS): for example the channel and its value. `None` for the error field of the
+    /// condition. Called for each EMCY of the fault: when it occurs, and when it is reported again after a reset.
+    fn fault_detail(&self, _number: u8) -> Option<[u8; 5]> {
+        None
+    }
+
+    /// A node whose heartbeat is monitored (1016h) is in another state than before, or boots up
+    /// ([`State::Initialising`]). A heartbeat that is missing is a [`fault`](Application::fault).
+    fn node_state(&mut self, _node: NodeId, _state: State, _image: &mut [u8]) {}
 
     /// A fault has occurred (`active`) or is over.
     fn fault(&mut self, _fault: Fault, _active: bool, _image: &mut [u8]) {}
@@ -109,7 +155,7 @@ pub trait Application {
 
     /// Whether a multiplexed TPDO in destination address mode sends this object to all nodes. An application returns
     /// `false` for the objects of a device part that is not installed. Called whenever the TPDO is configured, and
-    /// after a write to an entry that is [`handled`](crate::dictionary::Object::handled).
+    /// after a write to an entry with [`switches_pdos`](Application::switches_pdos).
     fn broadcasts(&self, _at: Multiplexer, _image: &[u8]) -> bool {
         true
     }
@@ -154,25 +200,3 @@ pub trait Application {
 
 /// An application without behaviour: the device holds values only.
 impl Application for () {}
-
-/// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ErrorClass(pub u8);
-
-impl ErrorClass {
-    /// Communication errors, sub-index 1.
-    pub const COMMUNICATION: ErrorClass = ErrorClass(1);
-    /// Errors of the device itself: sub-index 2, the first sub-index for a device profile or the manufacturer.
-    pub const DEVICE: ErrorClass = ErrorClass(2);
-}
-
-/// A part of a download to a domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part<'a> {
-    /// The download begins. The number of bytes, if the client announces it.
-    Begin(Option<usize>),
-    /// Some bytes, and the offset of the first one in the domain.
-    Data(usize, &'a [u8]),
-    /// The download is complete, with this number of bytes.
-    End(usize),
-}

@@ -1,67 +1,54 @@
 //! TPDOs that send events: the application keeps the events, and gives one whenever the TPDO may be sent.
 
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::{Application, STALE};
-use crate::pdo::Chain;
-use crate::transmit::ProcessContext;
+use crate::pdo::{Chain, ProcessContext};
 use crate::{Instant, Transmit};
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// The TPDO at this place can be sent from now on.
     pub(super) fn begin_events(&mut self, place: usize) {
-        let number = self.tpdos.get(place).and_then(crate::pdo::Tpdo::events_of);
-        if let Some(number) = number.filter(|_| self.basic.state.has_pdos()) {
-            self.basic.application.begin_events(number, &mut self.basic.image);
-            self.basic.process_due = STALE;
+        let number = self.tpdos.as_ref().get(place).and_then(crate::pdo::Tpdo::events_of);
+        if let Some(number) = number.filter(|_| self.state.has_pdos()) {
+            self.application.begin_events(number, self.image.as_mut());
+            self.process_due = STALE;
         }
     }
 
     /// Sends the waiting events of the application as far as they may be sent. Returns when to call again.
     #[inline]
     pub(super) fn send_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Instant {
-        if self.sends_events && self.basic.state.has_pdos() {
-            self.ask_for_events(context)
-        } else {
-            Instant::NEVER
-        }
+        if self.sends_events && self.state.has_pdos() { self.ask_for_events(context) } else { Instant::NEVER }
     }
 
     #[inline(never)]
     fn ask_for_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Instant {
         let mut due = Instant::NEVER;
-        for place in 0..self.tpdos.len() {
+        for place in 0..self.tpdos.as_ref().len() {
             while self.send_event(place, context) {}
-            due = due.min(self.tpdos.get(place).map_or(Instant::NEVER, crate::pdo::Tpdo::event_due));
+            due = due.min(self.tpdos.as_ref().get(place).map_or(Instant::NEVER, crate::pdo::Tpdo::event_due));
         }
         due
     }
 
     /// Sends one event of the TPDO, if the application has any. Returns whether an event was sent.
     fn send_event(&mut self, place: usize, context: &mut ProcessContext<'_, impl Transmit>) -> bool {
-        let Some(tpdo) = self.tpdos.get_mut(place) else { return false };
+        let Some(tpdo) = self.tpdos.as_mut().get_mut(place) else { return false };
         let Some(number) = tpdo.asks_for_event(context) else { return false };
-        let is_event = self.basic.application.next_event(number, &mut self.basic.image);
-        tpdo.take_event(is_event, &self.basic.image, context);
+        let is_event = self.application.next_event(number, self.image.as_mut());
+        tpdo.take_event(is_event, self.image.as_ref(), context);
         is_event
     }
 
     /// Sends one event of each TPDO that the SYNC triggers.
     pub(super) fn send_events_with_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
-        while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Valid)) {
+        while let Some(tpdo) = self.tpdos.as_mut().get_mut(links.next(Chain::Valid)) {
             links = tpdo.links;
             if let Some(number) = tpdo.asks_with_sync() {
-                let is_event = self.basic.application.next_event(number, &mut self.basic.image);
-                tpdo.take_event(is_event, &self.basic.image, context);
+                let is_event = self.application.next_event(number, self.image.as_mut());
+                tpdo.take_event(is_event, self.image.as_ref(), context);
             }
         }
     }

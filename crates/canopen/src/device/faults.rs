@@ -1,11 +1,11 @@
 //! Faults of the bus and of the application, and the reaction to an error (object 1029h).
 
-use super::body::Body;
-use super::full::Full;
-use super::{Application, Device, ErrorClass, Next, STALE};
+use super::Definition;
+use super::inner::Inner;
+use super::{Application, Device, Next, STALE};
 use crate::Instant;
 use crate::dictionary::Services;
-use crate::emcy::Fault;
+use crate::emcy::{ErrorClass, Fault};
 use crate::nmt::State;
 
 /// Error behaviour.
@@ -31,30 +31,21 @@ pub enum BusEvent {
     Recovered,
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Device<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Device<D> {
     /// Takes an event of the CAN controller: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
     /// communication error. A warning has no emergency code, because the node still works; a worse state is reported as
     /// error passive.
     pub fn on_bus(&mut self, event: BusEvent, now: Instant) -> Next {
-        let body = &mut self.body;
+        let inner = &mut self.inner;
         match event {
             BusEvent::Warning => (),
-            BusEvent::Overrun => body.report(Fault::Overrun, now),
-            BusEvent::Passive => body.raise(Fault::ErrorPassive, now),
+            BusEvent::Overrun => inner.report(Fault::Overrun, now),
+            BusEvent::Passive => inner.raise(Fault::ErrorPassive, now),
             BusEvent::BusOff => {
-                body.is_bus_off = true;
+                inner.is_bus_off = true;
                 return self.error(ErrorClass::COMMUNICATION);
             }
-            BusEvent::Recovered => body.recover(now),
+            BusEvent::Recovered => inner.recover(now),
         }
         self.process_next()
     }
@@ -62,65 +53,68 @@ impl<
     /// Sets or clears a fault of the application, by its number in [`Application::CONDITIONS`]. A fault is signalled
     /// once, until it is cleared.
     pub fn set_condition(&mut self, number: u8, active: bool, now: Instant) -> Next {
-        self.body.set_fault(Fault::Application(number), active, now);
+        self.inner.set_fault(Fault::Application(number), active, now);
         self.process_next()
     }
 
     /// Reacts to an error as object 1029h says. A [`Condition`](crate::Condition) with a class needs no such call: its
     /// fault is the error.
     pub fn error(&mut self, class: ErrorClass) -> Next {
-        self.body.emcy.add_error(class);
-        self.body.react();
-        self.body.basic.services_due = STALE;
+        self.inner.emcy.add_error(class);
+        self.inner.react();
+        self.inner.services_due = STALE;
         self.process_next()
     }
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// Applies object 1029h to the errors since the last call.
     ///
     /// Stopped has no EMCY. A node that has to stop is therefore Pre-operational until its EMCYs are sent; after
     /// bus-off, that is after the recovery.
     pub(super) fn react(&mut self) {
         while let Some(class) = self.emcy.take_error() {
-            self.basic.application.error(class, &mut self.basic.image);
+            self.application.error(class, self.image.as_mut());
             let ErrorClass(sub) = class;
-            let behaviour = self.basic().number(ERROR_BEHAVIOUR, sub);
-            if self.basic.state == State::Operational && matches!(behaviour, TO_PRE_OPERATIONAL | TO_STOPPED)
-            {
+            let behaviour = self.number(ERROR_BEHAVIOUR, sub);
+            if self.state == State::Operational && matches!(behaviour, TO_PRE_OPERATIONAL | TO_STOPPED) {
                 self.enter(State::PreOperational);
             }
-            if self.basic.state.has_services() && behaviour == TO_STOPPED {
-                self.basic.pending.next_state = Some(State::Stopped);
+            if self.state.has_services() && behaviour == TO_STOPPED {
+                self.pending.next_state = Some(State::Stopped);
             }
         }
-        let has_to_stop = self.basic.pending.next_state == Some(State::Stopped);
+        let has_to_stop = self.pending.next_state == Some(State::Stopped);
         if has_to_stop && (!Self::has(Services::EMCY) || self.emcy.is_idle()) && !self.is_bus_off {
-            self.basic.pending.next_state = None;
+            self.pending.next_state = None;
             self.enter(State::Stopped);
         }
+    }
+
+    /// After a reset: reports the faults that are still active, and the groups that could not be loaded.
+    pub(super) fn configure_faults(&mut self, now: Instant) {
+        if Self::has(Services::EMCY) {
+            let application = &self.application;
+            self.emcy.restart(|number| application.fault_detail(number), now);
+        } else {
+            self.emcy.restart_silently();
+        }
+        self.report_stored(now);
+        self.update_error_register();
     }
 
     /// EMCY has been switched on: reports the active faults. Messages that have waited are older.
     pub(super) fn report_active(&mut self, now: Instant) {
         self.emcy.forget_waiting();
-        self.emcy.repeat_singles(now);
+        let application = &self.application;
+        self.emcy.repeat_singles(|number| application.fault_detail(number), now);
         for number in self.watches.lost() {
-            let _ = self.emcy.repeat(Fault::Heartbeat(number), now);
+            let _ = self.emcy.repeat(Fault::Heartbeat(number), None, now);
         }
-        for fault in self.rpdos.iter().flat_map(crate::pdo::Rpdo::active) {
-            let _ = self.emcy.repeat(fault, now);
+        for fault in self.rpdos.as_ref().iter().flat_map(crate::pdo::Rpdo::active) {
+            let _ = self.emcy.repeat(fault, None, now);
         }
-        self.basic.services_due = STALE;
+        self.services_due = STALE;
     }
 
     /// Reports bus-off after the recovery: during bus-off, the node cannot send.
@@ -143,7 +137,11 @@ impl<
     #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
         let is_new = if Self::has(Services::EMCY) {
-            self.emcy.raise(fault, now)
+            let detail = match fault {
+                Fault::Application(number) => self.application.fault_detail(number),
+                _ => None,
+            };
+            self.emcy.raise(fault, detail, now)
         } else {
             self.emcy.raise_silently(fault)
         };
@@ -170,13 +168,13 @@ impl<
 
     fn fault_changed(&mut self, fault: Fault, active: bool) {
         self.update_error_register();
-        self.basic.application.fault(fault, active, &mut self.basic.image);
-        self.basic.services_due = STALE;
+        self.application.fault(fault, active, self.image.as_mut());
+        self.services_due = STALE;
     }
 
     pub(super) fn update_error_register(&mut self) {
-        if let Ok(entry) = self.basic.dictionary.find(0x1001, 0) {
-            entry.field.store(&mut self.basic.image, [self.emcy.register()]);
+        if let Ok(entry) = self.dictionary.find(0x1001, 0) {
+            entry.field.store(self.image.as_mut(), [self.emcy.register()]);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! LSS in the device. LSS works in every NMT state; without a node-ID it is the only service.
 
-use super::body::Body;
-use super::{Action, STALE};
+use super::inner::Inner;
+use super::{Action, Definition, STALE};
 use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
 use crate::transmit::{Context, RETRY};
 use crate::{Frame, Instant, NodeId, Transmit};
@@ -40,7 +40,11 @@ impl LssSlave {
     }
 
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
-        self.slave = Slave::new(Configuration { bit_rate, ..self.slave.pending() });
+        self.slave.set_pending(Configuration { bit_rate, ..self.slave.pending() });
+    }
+
+    pub(super) fn set_node_id(&mut self, node_id: Option<NodeId>) {
+        self.slave.set_pending(Configuration { node_id, ..self.slave.pending() });
     }
 
     /// A reset of the device.
@@ -63,16 +67,15 @@ impl LssSlave {
         &mut self,
         frame: &Frame,
         context: &mut Context<'_, impl Transmit>,
-        body: &mut impl Body,
+        inner: &mut Inner<impl Definition>,
     ) {
         let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
-        let basic = body.basic_mut();
-        let identity = basic.identity();
-        let response = match self.slave.take(request, &identity, basic.node_id) {
+        let identity = inner.identity();
+        let response = match self.slave.take(request, &identity, inner.node_id) {
             Outcome::Silence => None,
             Outcome::Answer(response) => Some(response),
             Outcome::BootUp => {
-                basic.request_boot_up();
+                inner.request_boot_up();
                 None
             }
             Outcome::Switch(switch) => {
@@ -81,13 +84,13 @@ impl LssSlave {
                 None
             }
             // The response is sent at the end of the job.
-            Outcome::Store(configuration) if body.store_configuration(configuration) => None,
+            Outcome::Store(configuration) if inner.store_configuration(configuration) => None,
             Outcome::Store(_) => Some(Slave::stored(false)),
         };
         if let Some(response) = response {
             self.respond(response, context);
         }
-        body.basic_mut().services_due = STALE;
+        inner.services_due = STALE;
     }
 
     /// Sends a response. It replaces a response that still waits: the master no longer expects the older one.
@@ -111,7 +114,11 @@ impl LssSlave {
 
     /// Continues a change of the bit rate. Frames that were held back are sent after the change.
     /// Returns the new bit rate when the bus changes to it.
-    pub(super) fn poll_switching(&mut self, now: Instant, body: &mut impl Body) -> Option<BitRate> {
+    pub(super) fn poll_switching(
+        &mut self,
+        now: Instant,
+        inner: &mut Inner<impl Definition>,
+    ) -> Option<BitRate> {
         if now < self.switching_due {
             return None;
         }
@@ -119,7 +126,7 @@ impl LssSlave {
             (self.switching, self.switching_due) = (Switching::No, Instant::NEVER);
             return None;
         };
-        body.basic_mut().ask(Action::BitRate(switch.bit_rate));
+        inner.ask(Action::BitRate(switch.bit_rate));
         (self.switching, self.switching_due) = (Switching::After, now.plus(switch.delay()));
         Some(switch.bit_rate)
     }

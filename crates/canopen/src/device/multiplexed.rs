@@ -1,8 +1,8 @@
 //! Multiplexed PDOs in the device: the objects that the producer monitors, and the destination of a received object.
 
 use super::Application;
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
@@ -16,16 +16,7 @@ const DISPATCHING_LIST: u16 = 0x1FD0;
 /// The longest value in a multiplexed PDO, in bytes.
 const LONGEST: u8 = 4;
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// Gives the producer its settings and its objects, after any change that may affect them. Unchanged settings keep
     /// the record of the values that have been sent, so nothing is sent again.
     pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
@@ -42,7 +33,7 @@ impl<
         if addressing == Some(Addressing::Destination) {
             self.select_watched();
         }
-        if !self.basic.state.has_pdos() {
+        if !self.state.has_pdos() {
             return;
         }
         if is_new {
@@ -54,7 +45,7 @@ impl<
 
     /// Monitors all objects that can be sent.
     fn watch_all(&mut self) {
-        for entry in self.basic.dictionary.entries() {
+        for entry in self.dictionary.entries() {
             self.watch_entry(&entry);
         }
     }
@@ -62,7 +53,7 @@ impl<
     /// Selects the objects to send: the application broadcasts them, and no TPDO maps them. A TPDO that is switched off
     /// counts too: switching it off must not send its objects in another frame.
     fn select_watched(&mut self) {
-        let (application, image) = (&self.basic.application, &self.basic.image);
+        let (application, image) = (&self.application, self.image.as_ref());
         self.scanner.select(|at| application.broadcasts(at, image));
         self.deselect_mapped();
         self.scanner.forget_deselected();
@@ -70,11 +61,11 @@ impl<
 
     /// Monitors the objects of the scanner list. Each line is a block of sub-indexes of one object.
     fn watch_listed(&mut self) {
-        let [count, ..] = self.basic().number(SCANNER_LIST, 0).to_le_bytes();
+        let [count, ..] = self.number(SCANNER_LIST, 0).to_le_bytes();
         for line in 0..count {
-            let [first, low, high, size] = self.basic().number(SCANNER_LIST, line + 1).to_le_bytes();
+            let [first, low, high, size] = self.number(SCANNER_LIST, line + 1).to_le_bytes();
             for sub in first..first.saturating_add(size) {
-                if let Ok(entry) = self.basic.dictionary.find(u16::from_le_bytes([low, high]), sub) {
+                if let Ok(entry) = self.dictionary.find(u16::from_le_bytes([low, high]), sub) {
                     self.watch_entry(&entry);
                 }
             }
@@ -93,7 +84,7 @@ impl<
         let Some(mpdo) = Mpdo::parse(frame) else { return };
         match (mpdo.address, addressing) {
             (Address::Destination(node), Addressing::Destination)
-                if node.is_none() || node == self.basic.node_id =>
+                if node.is_none() || node == self.node_id =>
             {
                 self.take_addressed(&mpdo, node, now);
             }
@@ -122,7 +113,7 @@ impl<
 
     /// The entry at this place, if a multiplexed PDO can write it.
     fn consumed(&self, at: Multiplexer) -> Option<Entry> {
-        let entry = self.basic.dictionary.find(at.index, at.sub).ok()?;
+        let entry = self.dictionary.find(at.index, at.sub).ok()?;
         (entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST).then_some(entry)
     }
 
@@ -134,7 +125,7 @@ impl<
     }
 
     fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
-        let count = self.basic().number(DISPATCHING_LIST, 0).to_le_bytes()[0];
+        let count = self.number(DISPATCHING_LIST, 0).to_le_bytes()[0];
         for line in 0..count {
             let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
             if let Some(at) = target {
@@ -145,8 +136,8 @@ impl<
     }
 
     fn dispatching_line(&self, sub: u8) -> Option<DispatchingLine> {
-        let entry = self.basic.dictionary.find(DISPATCHING_LIST, sub).ok()?;
-        let [node, remote_sub, a, b, sub, c, d, size] = entry.field.load(&self.basic.image);
+        let entry = self.dictionary.find(DISPATCHING_LIST, sub).ok()?;
+        let [node, remote_sub, a, b, sub, c, d, size] = entry.field.load(self.image.as_ref());
         let remote = Multiplexer { index: u16::from_le_bytes([a, b]), sub: remote_sub };
         let local = Multiplexer { index: u16::from_le_bytes([c, d]), sub };
         Some(DispatchingLine { sender: NodeId::new(node)?, remote, local, size })

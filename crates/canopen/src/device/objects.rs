@@ -1,32 +1,37 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::pdos::low_half;
-use super::{Application, Job, Part, STALE};
+use super::state::SELF_START;
+use super::store::{check_program_control, command};
+use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
-use crate::sdo::{Abort, Multiplexer, Objects, Writable};
-use crate::{Instant, emcy, sync};
+use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
+use crate::{Instant, emcy, sync, time_stamp};
 
-impl<B: Body> Objects for B {
-    const BLOCK_UPLOAD: bool = B::Application::BLOCK_UPLOAD;
+impl<D: Definition> Objects for Inner<D> {
+    const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
+    const BLOCK_DOWNLOAD: bool = D::Application::BLOCK_DOWNLOAD;
 
-    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
-        let basic = self.basic();
-        let entry = basic.dictionary.find(at.index, at.sub)?;
+    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
         if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
+        if !entry.is_domain() {
+            self.application.read(&entry, self.image.as_mut())?;
+        }
         match entry.attributes.kind {
-            Type::Domain => basic.application.read_domain(at),
-            Type::VisibleString(_) => Ok(text(entry.field.get(&basic.image))),
+            Type::Domain => self.application.read_domain(at),
+            Type::VisibleString(_) => Ok(text(entry.field.get(self.image.as_ref()))),
             _ if entry.rule().is_computed() => self.computed(&entry),
-            _ => Ok(entry.field.get(&basic.image)),
+            _ => Ok(entry.field.get(self.image.as_ref())),
         }
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
-        let entry = self.basic().dictionary.find(at.index, at.sub)?;
+        let entry = self.dictionary.find(at.index, at.sub)?;
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
@@ -34,128 +39,149 @@ impl<B: Body> Objects for B {
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
-        let found = self.basic().dictionary.find(at.index, at.sub);
+        let found = self.dictionary.find(at.index, at.sub);
         // By reference: a move out of the result takes a dozen instructions.
         let entry = found.as_ref().map_err(|abort| *abort)?;
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
-        self.basic().application.admits(entry)?;
+        self.application.admits(entry)?;
         if entry.is_domain() {
-            return write_domain(self, at, bytes);
+            return self.write_domain(at, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(value)?;
-        let job = self.check_store(entry)?;
+        let job = self.job_of(entry)?;
         match entry.rule() {
-            Rule::Plain => entry.field.set_number(&mut self.basic_mut().image, value, bytes),
-            _ => write_by_rule(self, entry, value, bytes, now)?,
+            Rule::Plain => entry.field.set_number(self.image.as_mut(), value, bytes),
+            Rule::Application => self.write_handled(entry, bytes, now)?,
+            _ => self.write_by_rule(entry, value, bytes, now)?,
         }
-        let basic = self.basic_mut();
         if entry.is_parameter() {
-            basic.pending.parameters_changed();
+            self.pending.parameters_changed();
         }
-        basic.application.written(entry, &mut basic.image);
-        job.map_or(Ok(()), |job| self.store_at_once(job))
+        self.application.written(entry, self.image.as_mut());
+        job.map_or(Ok(()), |job| self.begin_deferred(job))
     }
 
     fn take_deferred(&mut self) -> bool {
-        Body::take_deferred(self)
+        Self::has(Services::FAULTS) && self.jobs.take_deferred()
     }
 
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
-        self.basic_mut().application.write_domain(at, part)
+        self.application.write_domain(at, part)
     }
 }
 
-/// Writes a domain whose download arrived in one piece.
-fn write_domain(body: &mut impl Body, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
-    let application = &mut body.basic_mut().application;
-    application.write_domain(at, Part::Begin(Some(bytes.len())))?;
-    application.write_domain(at, Part::Data(0, bytes))?;
-    application.write_domain(at, Part::End(bytes.len()))
-}
+impl<D: Definition> Inner<D> {
+    /// Writes a domain whose download arrived in one piece.
+    fn write_domain(&mut self, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
+        self.application.write_domain(at, Part::Begin(Some(bytes.len())))?;
+        self.application.write_domain(at, Part::Data(0, bytes))?;
+        self.application.write_domain(at, Part::End(bytes.len()))
+    }
 
-/// Writes an entry whose rule does more than storing a value.
-#[inline(never)]
-fn write_by_rule(
-    body: &mut impl Body,
-    entry: &Entry,
-    value: u32,
-    bytes: &[u8],
-    now: Instant,
-) -> Result<(), Abort> {
-    let basic = body.basic_mut();
-    let rule = entry.rule();
-    if rule == Rule::Application {
-        basic.application.write(entry, bytes, &mut basic.image)?;
-        basic.pending.parameters_changed();
-    } else {
-        body.admit(entry, value)?;
+    /// Writes an entry whose values the application accepts or refuses.
+    fn write_handled(&mut self, entry: &Entry, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+        self.application.write(entry, bytes, self.image.as_mut())?;
+        entry.field.set(self.image.as_mut(), bytes);
+        self.pending.parameters_changed();
+        if Self::has_process() && self.application.switches_pdos(entry) {
+            self.apply_application_changes(now);
+            (self.process_due, self.services_due) = (STALE, STALE);
+        }
+        Ok(())
     }
-    let basic = body.basic_mut();
-    if !rule.is_computed() && !rule.is_command() {
-        entry.field.set(&mut basic.image, bytes);
-    }
-    if rule == Rule::HeartbeatTime {
-        basic.heartbeat.set_period(low_half(value), now);
-    }
-    body.value_written(entry, value, now);
-    let basic = body.basic_mut();
-    (basic.process_due, basic.services_due) = (STALE, STALE);
-    Ok(())
-}
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
-    /// Whether the rule of the entry allows the value.
-    pub(super) fn admit_value(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
+    /// Writes an entry whose rule does more than storing a value: everything that can refuse the value comes before
+    /// any effect.
+    #[inline(never)]
+    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+        let rule = entry.rule();
+        self.check(entry, value)?;
+        if !rule.is_computed() && !rule.is_command() {
+            entry.field.set(self.image.as_mut(), bytes);
+        }
+        self.apply(entry, value, now);
+        self.services_due = STALE;
+        if Self::has_process() {
+            self.process_due = STALE;
+        }
+        Ok(())
+    }
+
+    /// The value of an entry whose value is not in the image.
+    fn computed(&self, entry: &Entry) -> Result<&[u8], Abort> {
+        let history = self.emcy.history();
         match entry.rule() {
-            Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
+            Rule::ErrorCount if Self::has(Services::FAULTS) => Ok(core::slice::from_ref(history.count())),
+            Rule::ErrorEntry if Self::has(Services::EMCY) => {
+                Ok(history.error(entry.sub()).ok_or(Abort::NoData)?)
+            }
+            _ => Err(Abort::NoData),
+        }
+    }
+
+    /// Whether the rule of the entry allows the value. Nothing changes.
+    fn check(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        match entry.rule() {
+            Rule::ErrorCount if value != 0 && Self::has(Services::FAULTS) => Err(Abort::InvalidValue),
             Rule::SyncCobId if Self::has(Services::SYNC) => sync::check_cob_id(value),
+            Rule::SyncProducer if Self::has(Services::SYNC_PRODUCER) => {
+                sync::check_producer(self.word(entry.field), value)
+            }
+            Rule::TimeCobId if Self::has(Services::TIME) => {
+                time_stamp::check_cob_id(self.word(entry.field), value)
+            }
             Rule::SyncOverflow if Self::has(Services::SYNC) => {
-                sync::check_overflow(value, self.basic().number(0x1006, 0))
+                sync::check_overflow(value, self.number(0x1006, 0))
             }
-            Rule::EmcyCobId if Self::has(Services::EMCY) => {
-                emcy::check_cob_id(self.basic().word(entry.field), value)
+            Rule::EmcyCobId if Self::has(Services::EMCY) => emcy::check_cob_id(self.word(entry.field), value),
+            Rule::StartUp if Self::has(Services::SELF_START) => {
+                if matches!(value, 0 | SELF_START) {
+                    Ok(())
+                } else {
+                    Err(Abort::InvalidValue)
+                }
             }
-            Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
+            Rule::ProgramControl if Self::has(Services::PROGRAM_CONTROL) => check_program_control(value),
             Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting
-                if !Self::has(Services::STORE) =>
+                if Self::has(Services::STORE) =>
             {
-                Err(Abort::NotStored)
+                self.check_job(command(entry, value)?)
             }
-            Rule::Store | Rule::Restore => self.admit_store(entry, value),
-            Rule::StoreCalibration => self.admit_store_calibration(value),
-            Rule::Setting => self.begin_deferred(Job::Setting(value.to_le_bytes()[0])),
-            Rule::ProgramControl => self.admit_program_control(value),
-            Rule::HeartbeatWatch if W > 0 => self.admit_watch(entry, value),
+            rule if rule.is_command() => Err(Abort::NotStored),
+            Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => self.check_watch(entry, value),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType
             | Rule::PdoInhibit
             | Rule::PdoSyncStart
             | Rule::PdoCount
-            | Rule::PdoSlot => self.admit_pdo(entry, value),
+            | Rule::PdoSlot
+                if Self::has_process() =>
+            {
+                self.check_pdo(entry, value)
+            }
             _ => Ok(()),
         }
     }
 
-    /// Hands a new value to the protocol that uses it.
-    pub(super) fn apply_value(&mut self, entry: &Entry, value: u32, now: Instant) {
+    /// Hands a new value to the protocol that uses it, or carries out a command.
+    fn apply(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
-            Rule::Application => self.apply_application_changes(now),
-            Rule::ErrorCount => self.emcy.clear_history(),
-            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow
+            Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
+            Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),
+            Rule::TimeCobId if Self::has(Services::TIME) => self.configure_time(),
+            Rule::GuardTime | Rule::LifeTimeFactor if Self::has(Services::GUARDING) => {
+                self.configure_guarding(now);
+            }
+            Rule::SyncCobId
+            | Rule::SyncProducer
+            | Rule::SyncPeriod
+            | Rule::SyncWindow
+            | Rule::SyncOverflow
                 if Self::has(Services::SYNC) =>
             {
                 self.configure_sync(now);
@@ -164,22 +190,41 @@ impl<
             Rule::EmcyCobId if Self::has(Services::EMCY) && self.emcy.configure(value) => {
                 self.report_active(now);
             }
-            Rule::HeartbeatWatch if W > 0 => self.configure_watch(entry.sub(), now),
-            Rule::ScannerLine if M > 0 => self.configure_pdos(now),
+            Rule::ProgramControl if Self::has(Services::PROGRAM_CONTROL) => self.control_program(value),
+            Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting
+                if Self::has(Services::STORE) =>
+            {
+                // `check` has made sure that the job can begin.
+                let _ = command(entry, value).and_then(|job| self.begin_deferred(job));
+            }
+            Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => {
+                self.configure_watch(entry.sub(), now);
+            }
+            Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => self.configure_pdos(now),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType
             | Rule::PdoInhibit
             | Rule::PdoEventTimer
             | Rule::EventTimerOf(_)
-            | Rule::PdoSyncStart => self.configure_pdo(entry, now),
+            | Rule::PdoSyncStart
+                if Self::has_process() =>
+            {
+                self.configure_pdo(entry, now);
+            }
             _ => (),
         }
         if matches!(
             entry.rule(),
-            Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
-        ) {
-            self.basic.pending.identifiers_changed();
+            Rule::SyncCobId
+                | Rule::SyncProducer
+                | Rule::TimeCobId
+                | Rule::PdoCobId
+                | Rule::PdoPredefined
+                | Rule::HeartbeatWatch
+        ) && Self::has(Services::FAULTS)
+        {
+            self.pending.identifiers_changed();
         }
     }
 }

@@ -5,13 +5,13 @@
 //! 0, entries, count, COB-ID valid.
 
 use super::Application;
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::rpdos::filter_bit;
-use crate::dictionary::{Dictionary, Entry, Rule, Services};
+use crate::dictionary::{Dictionary, Direction, Entry, Rule, Services};
 use crate::pdo::{
-    Addressing, Chain, Content, Direction, Layout, Links, MappedObject, RpdoSettings, ScannerSettings,
-    Settings, Transmission, locate,
+    Addressing, Chain, Content, Layout, Links, MappedObject, RpdoSettings, ScannerSettings, Settings,
+    Transmission, locate,
 };
 use crate::sdo::Abort;
 use crate::{CobId, Instant};
@@ -19,7 +19,7 @@ use crate::{CobId, Instant};
 /// A PDO of the dictionary, by the index of its communication object.
 ///
 /// A dictionary may use any of the 512 PDO numbers. The device keeps its PDOs in the first elements of an array, in the
-/// order of their numbers ([`Full::place`]).
+/// order of their numbers ([`Inner::place`]).
 #[derive(Clone, Copy, Debug)]
 struct Pdo {
     communication: u16,
@@ -54,25 +54,16 @@ impl Pdo {
     }
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// Gives every PDO its settings.
     pub(super) fn configure_pdos(&mut self, now: Instant) {
         for direction in Self::directions() {
-            for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
-                self.apply(pdo, place, now);
+            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
+                self.configure_one(pdo, place, now);
             }
         }
         self.link_pdos();
-        if M > 0 {
+        if Self::has(Services::MULTIPLEXED_TPDO) {
             self.configure_scanner(None);
         }
         self.update_scanner();
@@ -80,7 +71,7 @@ impl<
 
     /// Gives the multiplexed TPDO its settings, if the rows have one.
     fn update_scanner(&mut self) {
-        if M > 0 {
+        if Self::has(Services::MULTIPLEXED_TPDO) {
             self.configure_scanner(self.scanner_settings());
         }
     }
@@ -89,7 +80,7 @@ impl<
     pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Instant) {
         let pdo = Pdo::of(entry);
         if let Some(place) = self.place(pdo) {
-            self.apply(pdo, place, now);
+            self.configure_one(pdo, place, now);
         }
         self.link_pdos();
         self.update_scanner();
@@ -99,16 +90,16 @@ impl<
     pub(super) fn apply_application_changes(&mut self, now: Instant) {
         let mut has_changed = false;
         for direction in Self::directions() {
-            for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
+            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
                 if self.is_valid(pdo) != self.is_used(pdo, place) {
-                    self.apply(pdo, place, now);
+                    self.configure_one(pdo, place, now);
                     has_changed = true;
                 }
             }
         }
         if has_changed {
             self.link_pdos();
-            self.basic.pending.identifiers_changed();
+            self.pending.identifiers_changed();
         }
         self.update_scanner();
     }
@@ -117,7 +108,7 @@ impl<
     fn is_valid(&self, pdo: Pdo) -> bool {
         match pdo.direction() {
             Direction::Transmit => self.tpdo_settings(pdo).is_some(),
-            Direction::Receive => R > 0 && self.rpdo_settings(pdo).is_some(),
+            Direction::Receive => Self::has(Services::RPDO) && self.rpdo_settings(pdo).is_some(),
         }
     }
 
@@ -125,14 +116,16 @@ impl<
     fn is_used(&self, pdo: Pdo, place: u16) -> bool {
         let place = usize::from(place);
         match pdo.direction() {
-            Direction::Transmit => self.tpdos.get(place).is_some_and(|tpdo| tpdo.settings().is_some()),
-            Direction::Receive => self.rpdos.get(place).is_some_and(|rpdo| rpdo.id().is_some()),
+            Direction::Transmit => {
+                self.tpdos.as_ref().get(place).is_some_and(|tpdo| tpdo.settings().is_some())
+            }
+            Direction::Receive => self.rpdos.as_ref().get(place).is_some_and(|rpdo| rpdo.id().is_some()),
         }
     }
 
     /// The position of a PDO in the array of the device: its rank among the PDOs of the dictionary in this direction.
     fn place(&self, pdo: Pdo) -> Option<u16> {
-        let mut ranked = (0..).zip(Pdo::all(self.basic.dictionary, pdo.direction()));
+        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction()));
         ranked.find(|(_, other)| other.communication == pdo.communication).map(|(place, _)| place)
     }
 
@@ -141,19 +134,19 @@ impl<
         self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
 
-    fn apply(&mut self, pdo: Pdo, place: u16, now: Instant) {
+    fn configure_one(&mut self, pdo: Pdo, place: u16, now: Instant) {
         match pdo.direction() {
             Direction::Transmit => self.configure_tpdo(pdo, place),
-            Direction::Receive if R > 0 => self.configure_rpdo(pdo, place, now),
+            Direction::Receive if Self::has(Services::RPDO) => self.configure_rpdo(pdo, place, now),
             Direction::Receive => (),
         }
     }
 
     fn configure_tpdo(&mut self, pdo: Pdo, place: u16) {
         let settings = self.tpdo_settings(pdo);
-        if let Some(tpdo) = self.tpdos.get_mut(usize::from(place)) {
+        if let Some(tpdo) = self.tpdos.as_mut().get_mut(usize::from(place)) {
             tpdo.configure(settings);
-            if self.basic.state.has_pdos() {
+            if self.state.has_pdos() {
                 tpdo.start();
             }
             self.begin_events(usize::from(place));
@@ -162,7 +155,7 @@ impl<
 
     fn configure_rpdo(&mut self, pdo: Pdo, place: u16, now: Instant) {
         let settings = self.rpdo_settings(pdo);
-        if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
+        if let Some(rpdo) = self.rpdos.as_mut().get_mut(usize::from(place)) {
             rpdo.configure(settings);
             rpdo.index = pdo.communication;
         }
@@ -172,8 +165,8 @@ impl<
     /// Links the valid PDOs to chains, after a change of their settings.
     fn link_pdos(&mut self) {
         (self.first_tpdos, self.first_rpdos) = (Links::END, Links::END);
-        self.sends_events = self.tpdos.iter().any(|tpdo| tpdo.events_of().is_some());
-        for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
+        self.sends_events = self.tpdos.as_ref().iter().any(|tpdo| tpdo.events_of().is_some());
+        for (place, tpdo) in self.tpdos.as_mut().iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
             let sends_values = settings.transmission.is_synchronous() && settings.events_of.is_none();
@@ -183,11 +176,11 @@ impl<
             }
         }
         (self.rpdo_filter, self.all_nodes) = (0, None);
-        for (place, rpdo) in self.rpdos.iter_mut().enumerate().rev() {
+        for (place, rpdo) in self.rpdos.as_mut().iter_mut().enumerate().rev() {
             rpdo.links = self.first_rpdos;
             let Some(id) = rpdo.id() else { continue };
             self.rpdo_filter |= filter_bit(id.get());
-            if rpdo.is_multiplexed() && self.basic.application.takes_all_nodes(rpdo.number()) {
+            if rpdo.is_multiplexed() && self.application.takes_all_nodes(rpdo.number()) {
                 self.rpdo_filter = u32::MAX;
                 self.all_nodes = u16::try_from(place).ok().map(|place| (id, place));
             }
@@ -208,7 +201,7 @@ impl<
             inhibit: low_half(self.parameter(pdo, 3)),
             event: low_half(self.parameter(pdo, 5)),
             sync_start: low_byte(self.parameter(pdo, 6)),
-            events_of: Some(pdo.number()).filter(|number| self.basic.application.sends_events(*number)),
+            events_of: Some(pdo.number()).filter(|number| self.application.sends_events(*number)),
             layout,
         })
     }
@@ -226,18 +219,18 @@ impl<
 
     /// Whether every mapping contains mappable objects only. A stored mapping may come from an older dictionary.
     pub(super) fn mappings_are_sound(&self) -> bool {
-        let mut pdos = Self::directions().flat_map(|direction| Pdo::all(self.basic.dictionary, direction));
+        let mut pdos = Self::directions().flat_map(|direction| Pdo::all(self.dictionary, direction));
         pdos.all(|pdo| self.content(pdo).is_some())
     }
 
     /// The settings of the multiplexed TPDO. Only one can exist (CiA 301, 7.2.2.6): the first valid one is used.
     fn scanner_settings(&self) -> Option<ScannerSettings> {
-        Pdo::all(self.basic.dictionary, Direction::Transmit).find_map(|pdo| {
+        Pdo::all(self.dictionary, Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
             let (cob_id, _) = self.transmission(pdo)?;
             let inhibit = low_half(self.parameter(pdo, 3));
             let event = low_half(self.parameter(pdo, 5));
-            Some(ScannerSettings { id: cob_id.id, addressing, own: self.basic.node_id?, inhibit, event })
+            Some(ScannerSettings { id: cob_id.id, addressing, own: self.node_id?, inhibit, event })
         })
     }
 
@@ -245,7 +238,7 @@ impl<
     /// multiplexed PDO in this direction.
     fn addressing(pdo: Pdo, count: u8) -> Option<Addressing> {
         let is_possible = match pdo.direction() {
-            Direction::Transmit => M > 0,
+            Direction::Transmit => Self::has(Services::MULTIPLEXED_TPDO),
             Direction::Receive => Self::has(Services::MULTIPLEXED_RPDO),
         };
         if is_possible { Addressing::from_count(count) } else { None }
@@ -253,8 +246,8 @@ impl<
 
     /// The directions in which the rows have PDOs.
     fn directions() -> impl Iterator<Item = Direction> {
-        let transmit = (T > 0).then_some(Direction::Transmit);
-        transmit.into_iter().chain((R > 0).then_some(Direction::Receive))
+        let transmit = (Self::has(Services::TPDO)).then_some(Direction::Transmit);
+        transmit.into_iter().chain((Self::has(Services::RPDO)).then_some(Direction::Receive))
     }
 
     /// The content that the mapping of a PDO describes; `None` when an entry of the mapping cannot be mapped.
@@ -268,7 +261,7 @@ impl<
 
     /// Excludes the objects of all TPDOs, valid or not, from the multiplexed TPDO.
     pub(super) fn deselect_mapped(&mut self) {
-        for pdo in Pdo::all(self.basic.dictionary, Direction::Transmit) {
+        for pdo in Pdo::all(self.dictionary, Direction::Transmit) {
             if let Some(Content::Objects(layout)) = self.content(pdo) {
                 self.scanner.deselect(&layout);
             }
@@ -277,39 +270,39 @@ impl<
 
     /// The number of mapped objects.
     fn mapped(&self, pdo: Pdo) -> u8 {
-        low_byte(self.basic().number(pdo.mapping(), 0))
+        low_byte(self.number(pdo.mapping(), 0))
     }
 
     /// The layout of the first `count` mapping entries.
     fn layout(&self, pdo: Pdo, count: u8) -> Result<Layout, Abort> {
         let mut layout = Layout::EMPTY;
         for slot in 0..count {
-            let mapped = MappedObject::parse(self.basic().number(pdo.mapping(), slot + 1));
-            layout.push(locate(self.basic.dictionary, mapped, pdo.direction())?)?;
+            let mapped = MappedObject::parse(self.number(pdo.mapping(), slot + 1));
+            layout.push(locate(self.dictionary, mapped, pdo.direction())?)?;
         }
         Ok(layout)
     }
 
     fn parameter(&self, pdo: Pdo, sub: u8) -> u32 {
-        self.basic().number(pdo.communication, sub)
+        self.number(pdo.communication, sub)
     }
 
     /// The COB-ID of a valid PDO; `None` when the PDO is not valid or has no objects in the dictionary.
     fn cob_id(&self, pdo: Pdo) -> Option<CobId> {
-        CobId::parse(self.basic().number_or(pdo.communication, 1, u32::MAX)).filter(|cob_id| !cob_id.bit31)
+        CobId::parse(self.number_or(pdo.communication, 1, u32::MAX)).filter(|cob_id| !cob_id.bit31)
     }
 
     /// Whether a PDO object accepts a value. Most PDO objects can change only while the PDO is not valid.
-    pub(super) fn admit_pdo(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+    pub(super) fn check_pdo(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let pdo = Pdo::of(entry);
         let present = self.cob_id(pdo);
         match entry.rule() {
-            Rule::PdoCobId | Rule::PdoPredefined => self.admit_cob_id(pdo, present, entry, value),
-            Rule::PdoType => self.admit_type(pdo, present, low_byte(value)),
+            Rule::PdoCobId | Rule::PdoPredefined => self.check_cob_id(pdo, present, entry, value),
+            Rule::PdoType => self.check_type(pdo, present, low_byte(value)),
             Rule::PdoInhibit | Rule::PdoSyncStart if present.is_some() => Err(Abort::InvalidValue),
             Rule::PdoCount | Rule::PdoSlot if present.is_some() => Err(Abort::Access),
-            Rule::PdoCount => self.admit_count(pdo, low_byte(value)),
-            Rule::PdoSlot => self.admit_slot(pdo, value),
+            Rule::PdoCount => self.check_count(pdo, low_byte(value)),
+            Rule::PdoSlot => self.check_slot(pdo, value),
             _ => Ok(()),
         }
     }
@@ -319,12 +312,10 @@ impl<
     /// needs an event-driven type.
     ///
     /// A CAN-ID that a profile has pre-defined never changes, and is allowed for this PDO even if CiA 301 restricts it.
-    fn admit_cob_id(&self, pdo: Pdo, present: Option<CobId>, entry: &Entry, value: u32) -> Result<(), Abort> {
+    fn check_cob_id(&self, pdo: Pdo, present: Option<CobId>, entry: &Entry, value: u32) -> Result<(), Abort> {
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
         let is_predefined = entry.rule() == Rule::PdoPredefined;
-        if is_predefined
-            && CobId::parse(self.basic().default_number(entry)).is_none_or(|own| own.id != new.id)
-        {
+        if is_predefined && CobId::parse(self.default_number(entry)).is_none_or(|own| own.id != new.id) {
             return Err(Abort::InvalidValue);
         }
         let moves = present.is_some_and(|old| old.id != new.id);
@@ -339,7 +330,7 @@ impl<
     }
 
     /// An RPDO is not requested by remote frames, so its type cannot depend on them.
-    fn admit_type(&self, pdo: Pdo, present: Option<CobId>, kind: u8) -> Result<(), Abort> {
+    fn check_type(&self, pdo: Pdo, present: Option<CobId>, kind: u8) -> Result<(), Abort> {
         let transmission = Transmission::parse(kind).ok_or(Abort::InvalidValue)?;
         let no_remote = pdo.direction() == Direction::Receive || present.is_some_and(|cob_id| cob_id.bit30);
         let is_multiplexed = present.is_some() && Self::addressing(pdo, self.mapped(pdo)).is_some();
@@ -352,22 +343,22 @@ impl<
     }
 
     /// Checks the mapping as a whole: its length is known only when the count is written.
-    fn admit_count(&self, pdo: Pdo, count: u8) -> Result<(), Abort> {
+    fn check_count(&self, pdo: Pdo, count: u8) -> Result<(), Abort> {
         if Self::addressing(pdo, count).is_some() {
             return Ok(());
         }
-        let has_room = count == 0 || self.basic.dictionary.find(pdo.mapping(), count).is_ok();
+        let has_room = count == 0 || self.dictionary.find(pdo.mapping(), count).is_ok();
         if has_room { self.layout(pdo, count).map(|_| ()) } else { Err(Abort::ValueTooHigh) }
     }
 
-    fn admit_slot(&self, pdo: Pdo, value: u32) -> Result<(), Abort> {
+    fn check_slot(&self, pdo: Pdo, value: u32) -> Result<(), Abort> {
         if self.mapped(pdo) != 0 {
             return Err(Abort::Access);
         }
         if value == 0 {
             return Ok(());
         }
-        locate(self.basic.dictionary, MappedObject::parse(value), pdo.direction()).map(|_| ())
+        locate(self.dictionary, MappedObject::parse(value), pdo.direction()).map(|_| ())
     }
 }
 

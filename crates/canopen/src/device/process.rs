@@ -1,15 +1,15 @@
 //! Process data: NMT commands, SYNC, PDOs.
 
-use super::body::Body;
-use super::full::Full;
-use super::{Application, Device, Next, Node, STALE};
+use super::Definition;
+use super::inner::Inner;
+use super::{Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::nmt::Command;
-use crate::pdo::{Chain, Rpdo, Tpdo};
-use crate::transmit::ProcessContext;
+use crate::pdo::{Chain, ProcessContext, Rpdo, Tpdo};
+use crate::time_stamp::TimeOfDay;
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
-impl<B: Body> Node<B> {
+impl<D: Definition> Device<D> {
     /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
@@ -43,17 +43,22 @@ impl<B: Body> Node<B> {
         if is_nmt {
             self.on_nmt(frame);
         }
-        let context = &mut self.services.process_context(now, out);
-        if !is_nmt && self.body.basic().state.has_pdos() {
-            self.body.on_pdo_frame(frame, context);
+        if !Inner::<D>::has_process() {
+            return;
         }
-        self.body.send_process(context);
+        if D::SERVICES.contains(Services::TIME) && self.inner.on_time(frame) {
+            return;
+        }
+        let context = &mut self.services.process_context(now, out);
+        if !is_nmt && self.inner.state.has_pdos() {
+            self.inner.take_pdo_frame(frame, context);
+        }
+        self.inner.send_process(context);
     }
 
     #[inline(never)]
     fn on_nmt(&mut self, frame: &Frame) {
-        let basic = self.body.basic();
-        let own = basic.node_id.filter(|_| !basic.is_initialising());
+        let own = self.inner.node_id.filter(|_| !self.inner.is_initialising());
         let Some(command) = own.and_then(|own| Command::parse(frame.data(), own)) else { return };
         self.command(command);
     }
@@ -61,31 +66,20 @@ impl<B: Body> Node<B> {
     /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if now >= self.body.basic().process_due {
+        if Inner::<D>::has_process() && now >= self.inner.process_due {
             let context = &mut self.services.process_context(now, out);
-            self.body.send_process(context);
+            self.inner.send_process(context);
         }
         self.process_next()
     }
-}
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Device<A, N, T, R, W, M, S>
-{
     /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
     /// starts by itself (1F80h), the first `publish` after a start makes the device operational.
     pub fn publish(
         &mut self,
         now: Instant,
         out: &mut impl Transmit,
-        update: impl FnOnce(&mut A, &mut [u8]),
+        update: impl FnOnce(&mut D::Application, &mut [u8]),
     ) -> Next {
         self.show(update);
         self.send_changes(now, out);
@@ -96,63 +90,62 @@ impl<
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
         let context = &mut self.services.process_context(now, out);
-        let place = self.body.tpdo_place(tpdo);
-        if self.body.basic.state.has_pdos()
-            && let Some(tpdo) = place.and_then(|place| self.body.tpdos.get_mut(usize::from(place)))
+        let place = self.inner.tpdo_place(tpdo);
+        if self.inner.state.has_pdos()
+            && let Some(tpdo) = place.and_then(|place| self.inner.tpdos.as_mut().get_mut(usize::from(place)))
         {
             tpdo.on_event();
-            self.body.basic.process_due = STALE;
+            self.inner.process_due = STALE;
         }
-        self.body.send_process(context);
+        self.inner.send_process(context);
         self.process_next()
+    }
+
+    /// Sends the time stamp, if bit 30 of 1012h is set and the NMT state allows it. Returns whether it is sent.
+    pub fn send_time(&mut self, time: TimeOfDay, now: Instant, out: &mut impl Transmit) -> bool {
+        let context = &mut self.services.process_context(now, out);
+        self.inner.time_frame(time).is_some_and(|frame| context.send(frame))
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
         let context = &mut self.services.process_context(now, out);
-        self.body.self_start(context);
-        if self.body.basic.state.has_pdos() {
-            self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
-            let events_due = self.body.send_events(context);
-            self.body.basic.process_due = self.body.basic.process_due.min(events_due);
-            if M > 0 {
-                self.body.scanner.on_change(&self.body.basic.image, context);
-                self.body.basic.process_due = self.body.basic.process_due.min(self.body.scanner.due());
+        self.inner.self_start(context);
+        if self.inner.state.has_pdos() {
+            self.inner.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
+            let events_due = self.inner.send_events(context);
+            self.inner.process_due = self.inner.process_due.min(events_due);
+            if Inner::<D>::has(Services::MULTIPLEXED_TPDO) {
+                self.inner.scanner.on_change(self.inner.image.as_ref(), context);
+                self.inner.process_due = self.inner.process_due.min(self.inner.scanner.due());
             }
         }
-        self.body.send_process(context);
+        self.inner.send_process(context);
     }
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
     pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
-        let all_nodes = self.body.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
+        let all_nodes = self.inner.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
         self.own_process_ids().chain(all_nodes)
     }
 
     /// The identifiers as acceptance filters: each with a mask of the bits to compare. If an RPDO takes the frames of
     /// all nodes ([`Application::takes_all_nodes`]), there are far fewer filters than identifiers.
     pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
-        let all_nodes = self.body.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
+        let all_nodes = self.inner.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
         self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
     }
 
     fn own_process_ids(&self) -> impl Iterator<Item = CanId> {
-        let received = self.body.rpdos.iter().filter_map(Rpdo::id);
-        let requests = self.body.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
-        let sync = Some(self.body.sync.id()).filter(|_| Services::from_bits(S).contains(Services::SYNC));
-        [CanId::NMT].into_iter().chain(sync).chain(received).chain(requests.map(|tpdo| tpdo.id))
+        let received = self.inner.rpdos.as_ref().iter().filter_map(Rpdo::id);
+        let requests =
+            self.inner.tpdos.as_ref().iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
+        let sync = Some(self.inner.sync.id()).filter(|_| D::SERVICES.contains(Services::SYNC));
+        let time = self.inner.time_stamp.consumed().filter(|_| D::SERVICES.contains(Services::TIME));
+        [CanId::NMT].into_iter().chain(sync).chain(time).chain(received).chain(requests.map(|tpdo| tpdo.id))
     }
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         if Self::has(Services::SYNC) && self.sync.accepts(frame) {
             self.on_sync(frame, context);
@@ -162,7 +155,7 @@ impl<
                     tpdo.on_remote(image, context);
                 }
             });
-        } else if R > 0 {
+        } else if Self::has(Services::RPDO) {
             self.on_rpdo(frame, context.now);
         }
     }
@@ -170,10 +163,10 @@ impl<
     /// Visits the TPDOs of a chain. A TPDO that could not be sent at once makes the process data due.
     pub(super) fn each_tpdo(&mut self, chain: Chain, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
         let mut links = self.first_tpdos;
-        while let Some(tpdo) = self.tpdos.get_mut(links.next(chain)) {
-            visit(tpdo, &self.basic.image);
+        while let Some(tpdo) = self.tpdos.as_mut().get_mut(links.next(chain)) {
+            visit(tpdo, self.image.as_ref());
             if tpdo.is_pending() {
-                self.basic.process_due = STALE;
+                self.process_due = STALE;
             }
             links = tpdo.links;
         }
@@ -181,24 +174,30 @@ impl<
 
     #[inline(never)]
     pub(super) fn run_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        if Self::has(Services::SYNC_PRODUCER) {
+            self.produce_sync(context);
+        }
         if Self::has(Services::SYNC) {
             self.poll_sync(context.now);
         }
-        let mut due = if R > 0 { self.poll_rpdos(context.now) } else { Instant::NEVER };
+        let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Instant::NEVER };
         self.each_tpdo(Chain::Valid, |tpdo, image| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });
         due = due.min(self.send_events(context));
-        if M > 0 {
-            self.scanner.poll(&self.basic.image, context);
+        if Self::has(Services::MULTIPLEXED_TPDO) {
+            self.scanner.poll(self.image.as_ref(), context);
             due = due.min(self.scanner.due());
         }
         if Self::has(Services::SYNC) {
             due = due.min(self.sync.due());
         }
+        if Self::has(Services::SYNC_PRODUCER) {
+            due = due.min(self.sync_producer.due());
+        }
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
         debug_assert!(due > context.now, "process data are still due after a poll");
-        self.basic.process_due = due.max(context.now.plus(Duration(1)));
+        self.process_due = due.max(context.now.plus(Duration(1)));
     }
 }

@@ -1,29 +1,20 @@
 //! RPDOs in the device: reception, deadlines and faults.
 
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, little_endian};
 use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// Takes a data frame that may be an RPDO. A valid frame clears the faults of its RPDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
         }
         let (mut links, mut is_own) = (self.first_rpdos, false);
-        while let Some(rpdo) = self.rpdos.get(links.next(Chain::Valid)) {
+        while let Some(rpdo) = self.rpdos.as_ref().get(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
             if rpdo.is_of(frame) {
@@ -43,10 +34,10 @@ impl<
     }
 
     fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Instant) {
-        let Some(rpdo) = self.rpdos.get_mut(place) else { return };
+        let Some(rpdo) = self.rpdos.as_mut().get_mut(place) else { return };
         let late = Self::has(Services::SYNC) && rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
-        self.basic.process_due = self.basic.process_due.min(rpdo.due());
+        self.process_due = self.process_due.min(rpdo.due());
         let has_faults = rpdo.has_faults();
         if is_valid {
             self.store_rpdo(place, frame.bytes());
@@ -63,13 +54,13 @@ impl<
 
     /// Writes the data of an RPDO to the image, and notifies the application.
     pub(super) fn store_rpdo(&mut self, place: usize, data: [u8; 8]) {
-        let Some(rpdo) = self.rpdos.get(place) else { return };
+        let Some(rpdo) = self.rpdos.as_ref().get(place) else { return };
         let (index, number) = (rpdo.index, rpdo.number());
         match rpdo.layout() {
-            Some(layout) if !layout.is_checked() => layout.scatter(data, &mut self.basic.image),
+            Some(layout) if !layout.is_checked() => layout.scatter(data, self.image.as_mut()),
             _ => self.store_checked(index, data),
         }
-        self.basic.application.received(number, &mut self.basic.image);
+        self.application.received(number, self.image.as_mut());
     }
 
     /// Writes the data of an RPDO whose objects have limits or rules. Each value is checked as in an SDO download; a
@@ -77,10 +68,10 @@ impl<
     #[inline(never)]
     fn store_checked(&mut self, communication: u16, data: [u8; 8]) {
         let (mapping, mut rest) = (communication | 0x0200, data.as_slice());
-        let [count, ..] = self.basic().number(mapping, 0).to_le_bytes();
+        let [count, ..] = self.number(mapping, 0).to_le_bytes();
         for slot in 0..count {
-            let mapped = MappedObject::parse(self.basic().number(mapping, slot + 1));
-            let entry = self.basic.dictionary.find(mapped.index, mapped.sub);
+            let mapped = MappedObject::parse(self.number(mapping, slot + 1));
+            let entry = self.dictionary.find(mapped.index, mapped.sub);
             let size = usize::from(mapped.bits / 8);
             let Some((bytes, behind)) = rest.split_at_checked(size) else { return };
             if let Ok(entry) = entry {
@@ -92,17 +83,17 @@ impl<
 
     /// Writes a value from a PDO, if the object accepts it. Returns whether it does.
     pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) -> bool {
-        let Ok(job) = self.check_store_at_once(entry) else { return false };
+        let Ok(job) = self.job_of(entry) else { return false };
         let is_allowed = entry.check_value(little_endian(bytes)).is_ok()
             && (entry.rule() != Rule::Application
-                || self.basic.application.write(entry, bytes, &mut self.basic.image).is_ok());
+                || self.application.write(entry, bytes, self.image.as_mut()).is_ok());
         if !is_allowed {
             return false;
         }
-        entry.field.set(&mut self.basic.image, bytes);
+        entry.field.set(self.image.as_mut(), bytes);
         if entry.rule() == Rule::Application || entry.is_parameter() {
-            self.basic.pending.parameters_changed();
-            self.basic.services_due = STALE;
+            self.pending.parameters_changed();
+            self.services_due = STALE;
         }
         self.begin_checked(job);
         true
@@ -119,7 +110,7 @@ impl<
 
     #[inline(never)]
     fn set_rpdo_fault(&mut self, place: usize, kind: RpdoFault, active: bool, now: Instant) {
-        let Some(rpdo) = self.rpdos.get_mut(place) else { return };
+        let Some(rpdo) = self.rpdos.as_mut().get_mut(place) else { return };
         if !rpdo.set_fault(kind, active) {
             return;
         }
@@ -130,7 +121,7 @@ impl<
     /// Detects missing RPDOs. Returns the next deadline.
     pub(super) fn poll_rpdos(&mut self, now: Instant) -> Instant {
         let (mut due, mut links) = (Instant::NEVER, self.first_rpdos);
-        while let Some(rpdo) = self.rpdos.get_mut(links.next(Chain::Valid)) {
+        while let Some(rpdo) = self.rpdos.as_mut().get_mut(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
             if rpdo.expire(now) {

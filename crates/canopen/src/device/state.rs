@@ -1,19 +1,18 @@
 //! NMT state and resets, and the actions that wait for the caller.
 
-use super::basic::Basic;
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::pdos::low_half;
-use super::{Action, Application, Job, Next, Node, STALE};
+use super::{Action, Application, Device, Job, Next, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
-use crate::transmit::ProcessContext;
-use crate::{Instant, Transmit};
+use crate::pdo::ProcessContext;
+use crate::{Instant, NodeId, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
 
-/// The part of the device that [`Node::start`] initialises.
+/// The part of the device that [`Device::start`] initialises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reset {
     Communication,
@@ -130,38 +129,52 @@ impl Pending {
     }
 }
 
-impl<B: Body> Node<B> {
+impl<D: Definition> Device<D> {
     /// Initialises the scope of the last reset (the first time, everything) and boots up. If 1F80h asks for it, a
     /// [`Device`](super::Device) starts by itself with the next [`publish`](super::Device::publish). A node-ID that LSS has configured is
     /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let node_id = self.services.restart();
-        self.body.enter(State::Initialising);
-        self.body.basic_mut().node_id = node_id;
+        self.inner.enter(State::Initialising);
+        self.inner.node_id = node_id;
         self.load();
         if node_id.is_some() {
-            self.body.configure(now);
-            let basic = self.body.basic_mut();
-            basic.heartbeat.boot_up(low_half(basic.number(0x1017, 0)), now);
-            self.body.enter(State::PreOperational);
+            self.inner.configure(now);
+            let inner = &mut self.inner;
+            inner.heartbeat.boot_up(low_half(inner.number(0x1017, 0)), now);
+            self.inner.enter(State::PreOperational);
         }
         self.poll_services(now, out)
     }
 
-    /// Loads the values with which [`start`](Node::start) will begin, for parameters that are needed before the bus
+    /// Loads the values with which [`start`](Device::start) will begin, for parameters that are needed before the bus
     /// runs.
     // Not inlined: two callers, and much code.
     #[inline(never)]
     pub fn load(&mut self) {
-        let everything = self.body.basic().pending.reset == Reset::Node;
-        self.body.load_values(everything);
-        let basic = self.body.basic_mut();
-        basic.application.initialise(&mut basic.image);
-        basic.pending.values_loaded();
+        let everything = self.inner.pending.reset == Reset::Node;
+        self.inner.load_values(everything);
+        let inner = &mut self.inner;
+        inner.application.initialise(inner.image.as_mut());
+        inner.pending.values_loaded();
+    }
+
+    /// Carries out an NMT command of the application itself, as one of the master. A device that has not started ignores
+    /// it.
+    pub fn nmt(&mut self, command: Command, now: Instant, out: &mut impl Transmit) -> Next {
+        if self.inner.node_id.is_some() && !self.inner.is_initialising() {
+            self.command(command);
+        }
+        self.poll(now, out)
+    }
+
+    /// Sets the node-ID with which the next [`start`](Device::start) begins; `None` to wait for one from LSS.
+    pub fn set_node_id(&mut self, node_id: Option<NodeId>) {
+        self.services.set_node_id(node_id);
     }
 
     pub(super) fn command(&mut self, command: Command) {
-        let pending = &mut self.body.basic_mut().pending;
+        let pending = &mut self.inner.pending;
         pending.next_state = None;
         let state = match command {
             Command::Start => State::Operational,
@@ -176,28 +189,28 @@ impl<B: Body> Node<B> {
                 State::Initialising
             }
         };
-        self.body.enter(state);
+        self.inner.enter(state);
         self.silence_services();
     }
 
     /// Result of a call for process data: deadlines only.
     #[inline]
     pub(super) fn process_next(&self) -> Next {
-        let Basic { process_due, services_due, .. } = *self.body.basic();
+        let Inner { process_due, services_due, .. } = self.inner;
         Next { process: process_due, services: services_due, action: None, parameters: false }
     }
 
     /// Result of a call for services, with one waiting action.
     #[inline]
     pub(super) fn services_next(&mut self) -> Next {
-        let basic = self.body.basic_mut();
-        let parameters = core::mem::take(&mut basic.pending.parameters);
-        let action = if basic.pending.is_waiting { basic.hand_over() } else { None };
+        let inner = &mut self.inner;
+        let parameters = core::mem::take(&mut inner.pending.parameters);
+        let action = if inner.pending.is_waiting { inner.hand_over() } else { None };
         Next { action, parameters, ..self.process_next() }
     }
 }
 
-impl<A: Application> Basic<A, [u8]> {
+impl<D: Definition> Inner<D> {
     #[inline(never)]
     fn hand_over(&mut self) -> Option<Action> {
         let action = self.pending.take_action();
@@ -217,28 +230,19 @@ impl<A: Application> Basic<A, [u8]> {
         for entry in self.dictionary.entries().filter(|entry| scope.contains(entry)) {
             if entry.attributes.node_relative {
                 let default = self.default_number(&entry);
-                entry.field.store(&mut self.image, default.to_le_bytes());
+                entry.field.store(self.image.as_mut(), default.to_le_bytes());
             } else if entry.rule().has_place() {
-                entry.field.set(&mut self.image, self.dictionary.default(&entry));
+                entry.field.set(self.image.as_mut(), self.dictionary.default(&entry));
             }
         }
     }
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
     pub(super) fn self_start(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
-        let next_state = &mut self.basic.pending.next_state;
+        let next_state = &mut self.pending.next_state;
         if next_state.take_if(|state| *state == State::Operational).is_some() && self.emcy.register() == 0 {
             self.enter(State::Operational);
             self.send_process(context);

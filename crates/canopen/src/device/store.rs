@@ -3,11 +3,11 @@
 //! The device does not access the memory. It hands a [`Job`] to its caller, and answers the client when the job is
 //! done.
 
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::state::Scope;
 use super::{Action, Application, Device, Next, STALE};
-use crate::dictionary::{Entry, Group, Groups, Rule};
+use crate::dictionary::{Entry, Group, Groups, Rule, Services};
 use crate::emcy::Fault;
 use crate::lss::Configuration;
 use crate::nmt::State;
@@ -87,25 +87,16 @@ impl Jobs {
     }
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Device<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Device<D> {
     /// Reports the end of the job: `result` goes to the clients that wait for it. If an equal request has followed the
     /// handover, the job is handed over again instead, and the clients wait for the second run.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
-        if let Some(job) = self.body.jobs.take_repeated() {
-            self.body.basic.pending.ask_for(job);
-            self.body.basic.services_due = STALE;
+        if let Some(job) = self.inner.jobs.take_repeated() {
+            self.inner.pending.ask_for(job);
+            self.inner.services_due = STALE;
             return self.process_next();
         }
-        let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
+        let lss_waits = core::mem::take(&mut self.inner.jobs).lss_waits;
         let context = &mut self.services.context(now, out);
         self.finish_job(result, lss_waits, context);
         self.process_next()
@@ -113,15 +104,16 @@ impl<
 
     /// Whether a pause of `span` disturbs no service, for example while the erase of a flash page stops the core. The
     /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
-    /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and no heartbeat of another node (1016h) is
-    /// due.
+    /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and neither a heartbeat of another node (1016h)
+    /// nor a remote frame of a guarding master (100Ch) is due.
     #[must_use]
     pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
-        let basic = &self.body.basic;
-        matches!(basic.state, State::PreOperational | State::Stopped)
+        let inner = &self.inner;
+        matches!(inner.state, State::PreOperational | State::Stopped)
             && self.services.is_between_requests()
-            && now + span <= basic.heartbeat.latest()
-            && now + span <= self.body.watches.due()
+            && now + span <= inner.heartbeat.latest()
+            && now + span <= inner.watches.due()
+            && now + span <= inner.guarding.due()
     }
 }
 
@@ -131,21 +123,12 @@ impl Default for Jobs {
     }
 }
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     /// Whether a job could begin now. Another job is refused while one runs.
-    fn check_job(&self, job: Job) -> Result<(), Abort> {
+    pub(super) fn check_job(&self, job: Job) -> Result<(), Abort> {
         match self.jobs.running {
             Some(running) if running != job => Err(Abort::DeviceState),
-            _ => self.basic.application.can_store(),
+            _ => self.application.can_store(),
         }
     }
 
@@ -155,8 +138,8 @@ impl<
         self.check_job(job)?;
         if self.jobs.running.is_none() {
             self.jobs.running = Some(job);
-            self.basic.pending.ask_for(job);
-        } else if matches!(job, Job::Store(_)) && !self.basic.pending.has_job() {
+            self.pending.ask_for(job);
+        } else if matches!(job, Job::Store(_)) && !self.pending.has_job() {
             self.jobs.is_repeated = true;
         }
         Ok(())
@@ -164,8 +147,11 @@ impl<
 
     /// The job that a write to the entry begins, for an entry that the application stores at once. Nothing changes: an
     /// error refuses the write.
-    pub(super) fn check_store_at_once(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
-        let job = self.basic.application.stores(entry).map(Job::Store);
+    pub(super) fn job_of(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
+        if !Self::has(Services::FAULTS) {
+            return Ok(None);
+        }
+        let job = self.application.stores(entry).map(Job::Store);
         job.map_or(Ok(()), |job| self.check_job(job))?;
         Ok(job)
     }
@@ -174,29 +160,15 @@ impl<
     pub(super) fn begin_checked(&mut self, job: Option<Job>) {
         if let Some(job) = job {
             let _ = self.begin(job);
-            self.basic.services_due = STALE;
+            self.services_due = STALE;
         }
     }
 
-    /// Begins the job that a write to 1010h or 1011h asks for.
-    pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
-        let groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
-        let job = match (entry.rule(), value) {
-            (Rule::Store, SAVE) => Job::Store(groups),
-            (Rule::Restore, LOAD) => Job::Restore(groups),
-            _ => return Err(Abort::NotStored),
-        };
-        self.begin_deferred(job)
-    }
-
-    /// Begins to store the calibration. A calibration cannot be restored: no defaults would fit a real transducer.
-    pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
-        let job = Job::Store(Groups::one(Group::Calibration));
-        if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
-    }
-
     /// Begins to store a configuration from LSS. `false` when another job is under way.
-    pub(super) fn begin_configuration(&mut self, configuration: Configuration) -> bool {
+    pub(super) fn store_configuration(&mut self, configuration: Configuration) -> bool {
+        if !Self::has(Services::FAULTS) {
+            return false;
+        }
         let is_begun = self.begin(Job::Configure(configuration)).is_ok();
         self.jobs.lss_waits |= is_begun;
         is_begun
@@ -211,36 +183,31 @@ impl<
 
     /// Stop and reset of the program start the bootloader. The request gets no response; the bootloader answers the
     /// next one.
-    pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
-        match value {
-            STOP_PROGRAM | RESET_PROGRAM => {
-                self.basic.pending.ask(Action::Bootloader);
-                self.jobs.is_deferred = true;
-                Ok(())
-            }
-            START_PROGRAM => Ok(()),
-            _ => Err(Abort::InvalidValue),
+    pub(super) fn control_program(&mut self, value: u32) {
+        if value != START_PROGRAM {
+            self.pending.ask(Action::Bootloader);
+            self.jobs.is_deferred = true;
         }
     }
 
     /// Loads the stored values of a group. If they are damaged or do not fit, the whole group keeps its defaults.
     pub(super) fn load_stored(&mut self, group: Group) {
-        let Stored { packed, soundness } = self.basic.application.stored(group);
-        let (dictionary, node_id) = (self.basic.dictionary, self.basic.node_id);
+        let Stored { packed, soundness } = self.application.stored(group);
+        let (dictionary, node_id) = (self.dictionary, self.node_id);
         // An application that stores nothing returns this constant, and the compiler removes the rest.
         if packed.is_empty() && soundness == Soundness::Whole {
             self.lost.set(group, false);
             self.older.set(group, false);
-            return self.basic.application.loaded(group, true);
+            return self.application.loaded(group, true);
         }
-        let fits = dictionary.unpack(group, node_id, packed, &mut self.basic.image).is_ok()
+        let fits = dictionary.unpack(group, node_id, packed, self.image.as_mut()).is_ok()
             && self.mappings_are_sound();
         if !fits {
-            self.basic_mut().load_defaults(Scope::Group(group));
+            self.load_defaults(Scope::Group(group));
         }
         self.lost.set(group, !fits || soundness == Soundness::Lost);
         self.older.set(group, fits && soundness == Soundness::Older);
-        self.basic.application.loaded(group, fits && soundness == Soundness::Whole);
+        self.application.loaded(group, fits && soundness == Soundness::Whole);
     }
 
     /// Reports groups that could not be loaded, by EMCY.
@@ -250,5 +217,30 @@ impl<
             self.set_fault(Fault::StoredData(group), lost, now);
             self.set_fault(Fault::OlderData(group), older, now);
         }
+    }
+}
+
+/// The job that a write to a command begins. A calibration cannot be restored: no defaults would fit a real transducer.
+pub(super) fn command(entry: &Entry, value: u32) -> Result<Job, Abort> {
+    match (entry.rule(), value) {
+        (Rule::Setting, _) => Ok(Job::Setting(value.to_le_bytes()[0])),
+        (Rule::StoreCalibration, SAVE) => Ok(Job::Store(Groups::one(Group::Calibration))),
+        (Rule::Store, SAVE) => groups_of(entry).map(Job::Store),
+        (Rule::Restore, LOAD) => groups_of(entry).map(Job::Restore),
+        (Rule::Store | Rule::Restore, _) => groups_of(entry).and(Err(Abort::NotStored)),
+        _ => Err(Abort::NotStored),
+    }
+}
+
+fn groups_of(entry: &Entry) -> Result<Groups, Abort> {
+    Groups::of_sub(entry.sub()).ok_or(Abort::Access)
+}
+
+/// Checks a command for the running program (1F51h).
+pub(super) fn check_program_control(value: u32) -> Result<(), Abort> {
+    if matches!(value, STOP_PROGRAM | START_PROGRAM | RESET_PROGRAM) {
+        Ok(())
+    } else {
+        Err(Abort::InvalidValue)
     }
 }

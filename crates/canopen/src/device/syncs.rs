@@ -1,33 +1,56 @@
 //! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and the reaction to a SYNC.
 
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
 use super::{Application, STALE};
+use crate::dictionary::Services;
 use crate::emcy::Fault;
-use crate::pdo::Chain;
+use crate::pdo::{Chain, ProcessContext};
 use crate::sync::Settings;
-use crate::transmit::ProcessContext;
+use crate::transmit::RETRY;
 use crate::{Frame, Instant, Transmit};
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     pub(super) fn configure_sync(&mut self, now: Instant) {
-        let [overflow, ..] = self.basic().number(0x1019, 0).to_le_bytes();
-        self.sync.configure(Settings {
-            cob_id: self.basic().number_or(0x1005, 0, 0x80),
-            period: self.basic().number(0x1006, 0),
-            window: self.basic().number(0x1007, 0),
+        let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
+        let settings = Settings {
+            cob_id: self.number_or(0x1005, 0, 0x80),
+            period: self.number(0x1006, 0),
+            window: self.number(0x1007, 0),
             overflow,
-        });
+        };
+        if Self::has(Services::SYNC_PRODUCER) {
+            self.sync_producer.configure(&settings);
+            self.restart_sync();
+        }
+        self.sync.configure(settings);
         self.clear(Fault::SyncMissing, now);
+    }
+
+    /// Begins or ends the production of SYNCs, after a change of the settings or of the NMT state.
+    pub(super) fn restart_sync(&mut self) {
+        if self.state.has_services() {
+            self.sync_producer.restart()
+        } else {
+            self.sync_producer.stop()
+        }
+        self.process_due = STALE;
+    }
+
+    /// Sends the SYNC that is due, and reacts to it as to the SYNC of another node. Nothing precedes the boot-up message.
+    #[inline(never)]
+    pub(super) fn produce_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        if context.now < self.sync_producer.due() {
+            return;
+        }
+        let frame = self.sync_producer.frame();
+        if self.heartbeat.boots_up() || !context.send(frame) {
+            return self.sync_producer.wait_until(context.now.plus(RETRY));
+        }
+        self.sync_producer.sent(context.now);
+        if self.state.has_pdos() {
+            self.on_sync(&frame, context);
+        }
     }
 
     pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
@@ -38,29 +61,29 @@ impl<
             self.clear(Fault::SyncMissing, context.now);
         }
         let mut links = self.first_rpdos;
-        while let Some(rpdo) = self.rpdos.get_mut(links.next(Chain::Synchronous)) {
+        while let Some(rpdo) = self.rpdos.as_mut().get_mut(links.next(Chain::Synchronous)) {
             let place = links.next(Chain::Synchronous);
             links = rpdo.links;
             if let Some(data) = rpdo.take_waiting() {
                 self.store_rpdo(place, data);
             }
         }
-        self.basic.application.synchronised(sync.counter, &mut self.basic.image);
+        self.application.synchronised(sync.counter, self.image.as_mut());
         self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, context));
         if self.sends_events {
             self.send_events_with_sync(context);
         }
-        self.basic.process_due = self.basic.process_due.min(self.sync.due());
+        self.process_due = self.process_due.min(self.sync.due());
     }
 
     /// Detects a missing SYNC, and drops TPDOs that were not sent within the synchronous window.
     pub(super) fn poll_sync(&mut self, now: Instant) {
         if self.sync.expire(now) {
             self.raise(Fault::SyncMissing, now);
-            self.basic.process_due = STALE;
+            self.process_due = STALE;
         }
         if self.sync.is_window_over(now) {
-            self.tpdos.iter_mut().for_each(crate::pdo::Tpdo::drop_synchronous);
+            self.tpdos.as_mut().iter_mut().for_each(crate::pdo::Tpdo::drop_synchronous);
         }
     }
 }

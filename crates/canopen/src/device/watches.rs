@@ -1,35 +1,56 @@
 //! The heartbeats of other nodes: object 1016h, and the reaction to a missing heartbeat.
 
 use super::Application;
-use super::body::Body;
-use super::full::Full;
+use super::Definition;
+use super::inner::Inner;
+use super::pdos::low_half;
+use super::services::ERROR_CONTROL;
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::heartbeat::{Change, Watch};
 use crate::sdo::Abort;
-use crate::{Frame, Instant};
+use crate::transmit::Context;
+use crate::{Frame, Instant, Transmit};
 
 const CONSUMER_TIME: u16 = 0x1016;
 
-impl<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
-> Full<A, N, T, R, W, M, S>
-{
+impl<D: Definition> Inner<D> {
     #[inline(never)]
     pub(super) fn take_heartbeat(&mut self, frame: &Frame, now: Instant) {
-        if self.basic().is_initialising() {
+        if self.is_initialising() {
             return;
         }
-        if let Some(change) = self.watches.take(frame, now) {
+        let (application, image) = (&mut self.application, self.image.as_mut());
+        let change = self.watches.take(frame, now, |node, state| application.node_state(node, state, image));
+        if let Some(change) = change {
             self.on_watch(change, now);
         }
-        self.basic.services_due = self.basic.services_due.min(self.watches.due());
+        self.services_due = self.services_due.min(self.watches.due());
+    }
+
+    /// Answers a remote frame of a guarding master. A device with a heartbeat is not guarded.
+    #[inline(never)]
+    pub(super) fn on_guard(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
+        let id = self.service(ERROR_CONTROL);
+        let is_guarded = !self.is_initialising() && !self.heartbeat.boots_up() && !self.heartbeat.is_on();
+        if !frame.is_remote() || frame.id() != id.get() || !is_guarded {
+            return;
+        }
+        let (answer, is_back) = self.guarding.answer(self.state, context.now);
+        // In a full queue the answer is dropped: the master repeats its request.
+        let _ = context.send(Frame::data_frame(id, 1, [answer, 0, 0, 0, 0, 0, 0, 0]));
+        if is_back {
+            self.clear(Fault::LifeGuard, context.now);
+        }
+        self.serve_until(self.guarding.due());
+    }
+
+    /// Gives life guarding its times, from 100Ch and 100Dh.
+    pub(super) fn configure_guarding(&mut self, now: Instant) {
+        let [factor, ..] = self.number(0x100D, 0).to_le_bytes();
+        if self.guarding.configure(low_half(self.number(0x100C, 0)), factor) {
+            self.clear(Fault::LifeGuard, now);
+        }
     }
 
     pub(super) fn on_watch(&mut self, change: Change, now: Instant) {
@@ -40,7 +61,7 @@ impl<
     }
 
     /// Checks a value of 1016h: bits 24..31 are reserved, and a node can be monitored only once.
-    pub(super) fn admit_watch(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+    pub(super) fn check_watch(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         if value >> 24 != 0 {
             return Err(Abort::InvalidValue);
         }
@@ -51,7 +72,7 @@ impl<
     }
 
     fn watch(&self, sub: u8) -> Option<Watch> {
-        Watch::parse(self.basic().number(CONSUMER_TIME, sub))
+        Watch::parse(self.number(CONSUMER_TIME, sub))
     }
 
     /// Configures the monitoring of a node, and clears its fault.
@@ -63,7 +84,7 @@ impl<
     }
 
     pub(super) fn configure_watches(&mut self, now: Instant) {
-        for sub in (1..=u8::MAX).take(W) {
+        for sub in (1..=u8::MAX).take(self.watches.len()) {
             self.configure_watch(sub, now);
         }
     }

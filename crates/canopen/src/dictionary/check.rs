@@ -65,6 +65,7 @@ const fn check_row(row: &Object) {
 
 const fn check_default(row: &Object) {
     match (row.default, row.kind) {
+        (DefaultValue::Integer(_), Type::Real64) | (DefaultValue::None, Type::OctetString(_)) => (),
         (DefaultValue::Integer(value), _) => {
             require(row.kind.range().is_some(), row, "the default is an integer, the entry is not");
             let (low, high) = effective_limits(row);
@@ -105,6 +106,7 @@ const fn check_rule(row: &Object) {
             Rule::Application | Rule::Setting | Rule::StoreCalibration | Rule::EventTimerOf(_)
         ),
         Rule::PdoCobId => matches!(row.rule, Rule::PdoPredefined),
+        Rule::SyncCobId => matches!(row.rule, Rule::SyncProducer),
         // A bootloader controls the program itself.
         Rule::ProgramControl => matches!(row.rule, Rule::Application),
         _ => false,

@@ -4,9 +4,8 @@
 
 use super::compile::find;
 use super::fail::{fail, require};
-use super::{DefaultValue, Object, Rule};
+use super::{Addressing, DefaultValue, MappedObject, Object, Rule, Transmission};
 use crate::CobId;
-use crate::pdo::{Addressing, MappedObject, Transmission};
 
 /// The objects that describe a PDO. In both directions, the mapping parameter has bit 9 set.
 const MAPPING: u16 = 0x0200;

@@ -239,7 +239,7 @@ pub const fn image_size(rows: &[Object]) -> usize {
     total
 }
 
-/// The room that a device needs for a table of rows: the parameters of [`Device`](crate::Device).
+/// The room that a device needs for a table of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
     /// Size of the image of all values in bytes.
@@ -334,13 +334,15 @@ pub(super) const fn can_be_multiplexed(count: &Object) -> bool {
 macro_rules! device {
     ($application:ty, room: $sizes:expr) => {
         $crate::Device<
-            $application,
-            { $sizes.image },
-            { $sizes.tpdos },
-            { $sizes.rpdos },
-            { $sizes.watches },
-            { $sizes.scanned },
-            { $sizes.services.bits() },
+            $crate::plumbing::Rows<
+                $application,
+                { $sizes.image },
+                { $sizes.tpdos },
+                { $sizes.rpdos },
+                { $sizes.watches },
+                { $sizes.scanned },
+                { $sizes.services.bits() },
+            >,
         >
     };
     ($application:ty, $rows:expr) => {

@@ -82,20 +82,30 @@ impl Field {
         }
     }
 
-    /// The value of an UNSIGNED64, or of an UNSIGNED48.
+    /// The value of an UNSIGNED24 to UNSIGNED64, of a time of day or of a time difference.
     #[must_use]
     pub fn u64(self, image: &[u8]) -> u64 {
-        match self.size {
-            6 => u64::from_le_bytes(padded(&self.load::<6>(image))),
-            _ => u64::from_le_bytes(self.load(image)),
+        u64::from_le_bytes(padded(self.get(image)))
+    }
+
+    /// Sets an UNSIGNED24 to UNSIGNED64, a time of day or a time difference to the lowest bits of the value. A value of
+    /// less than three bytes keeps its bytes.
+    pub fn set_u64(self, image: &mut [u8], value: u64) {
+        if matches!(self.size, 3..=8) {
+            self.set(image, &value.to_le_bytes());
         }
     }
 
-    /// Sets an UNSIGNED64, or an UNSIGNED48 to the lowest 48 bits. A value of another size keeps its bytes.
-    pub fn set_u64(self, image: &mut [u8], value: u64) {
-        if matches!(self.size, 6 | 8) {
-            self.set(image, &value.to_le_bytes());
-        }
+    /// The value of an INTEGER24 to INTEGER64.
+    #[must_use]
+    pub fn i64(self, image: &[u8]) -> i64 {
+        let unused = 64_u32.saturating_sub(u32::from(self.size) * 8).min(63);
+        (self.u64(image) << unused).cast_signed() >> unused
+    }
+
+    /// Sets an INTEGER24 to INTEGER64 to the lowest bits of the value. A value of less than three bytes keeps its bytes.
+    pub fn set_i64(self, image: &mut [u8], value: i64) {
+        self.set_u64(image, value.cast_unsigned());
     }
 }
 
@@ -127,6 +137,7 @@ access! {
     u32, set_u32, "an UNSIGNED32";
     i32, set_i32, "an INTEGER32";
     f32, set_f32, "a REAL32";
+    f64, set_f64, "a REAL64";
 }
 
 /// The last bytes of an image, followed by zeros.
@@ -177,6 +188,15 @@ mod tests {
         assert_eq!(field(4).i32(&image), -70_000);
         field(4).set_f32(&mut image, 1.5);
         assert_eq!(field(4).f32(&image).to_bits(), 1.5_f32.to_bits());
+        field(8).set_f64(&mut image, -0.1);
+        assert_eq!(field(8).f64(&image).to_bits(), (-0.1_f64).to_bits());
+        for size in 3..=8 {
+            for value in [-1, -70_000, 8_388_607] {
+                field(size).set_i64(&mut image, value);
+                assert_eq!(field(size).i64(&image), value, "{size} bytes");
+            }
+        }
+        assert_eq!(image[11], 0, "the neighbour keeps its value");
         field(8).set_u64(&mut image, u64::MAX - 1);
         assert_eq!(field(8).u64(&image), u64::MAX - 1);
         field(6).set_u64(&mut image, 0x0102_0304_0506_0708);

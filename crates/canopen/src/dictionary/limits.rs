@@ -44,7 +44,7 @@ impl Limits {
 
     fn excess(self, kind: Type, value: u32) -> Abort {
         let is_low = match kind {
-            Type::Integer8 | Type::Integer16 | Type::Integer32 => {
+            Type::Integer8 | Type::Integer16 | Type::Integer24 | Type::Integer32 => {
                 value.cast_signed() < self.low.cast_signed()
             }
             _ => value < self.low,
@@ -90,6 +90,12 @@ mod tests {
             (5, i64::from(i32::MAX)),
             &[(1 << 31, LOW), (4, LOW), (5, Ok(())), (u32::MAX >> 1, Ok(()))],
         );
+        assert_checked(
+            Type::Integer24,
+            (-2, 1),
+            &[(0x80_0000, LOW), (0xFF_FFFD, LOW), (0xFF_FFFE, Ok(())), (1, Ok(())), (2, HIGH)],
+        );
+        assert_checked(Type::Unsigned24, (1, 0xFF_FFFE), &[(0, LOW), (0xFF_FFFE, Ok(())), (0xFF_FFFF, HIGH)]);
         assert_checked(Type::Unsigned8, (1, 254), &[(0, LOW), (1, Ok(())), (254, Ok(())), (255, HIGH)]);
         assert_checked(
             Type::Unsigned32,

@@ -18,9 +18,11 @@ mod group;
 mod limits;
 mod object;
 mod packed;
+mod pdo;
 mod rule;
 mod services;
 mod tables;
+mod transmission;
 mod types;
 
 pub use check::check;
@@ -32,7 +34,12 @@ pub use field::Field;
 pub use group::{Group, Groups};
 pub use object::{Access, DefaultValue, Mapping, Object};
 pub use packed::{BufferFull, is_packed, packed_size};
+pub(crate) use pdo::Direction;
+#[doc(hidden)]
+pub use pdo::{Addressing, MappedObject};
 pub use rule::Rule;
 pub use services::Services;
 pub use tables::{Dictionary, Entries, Tables};
+#[doc(hidden)]
+pub use transmission::Transmission;
 pub use types::Type;

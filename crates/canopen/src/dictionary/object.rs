@@ -107,7 +107,7 @@ impl Object {
         let default = match kind {
             Type::Real32 => DefaultValue::Real(0.0),
             Type::VisibleString(_) => DefaultValue::Text(""),
-            Type::Domain => DefaultValue::None,
+            Type::Domain | Type::OctetString(_) => DefaultValue::None,
             _ => DefaultValue::Integer(0),
         };
         let (mapping, group, rule) = (Mapping::No, None, Rule::of(index, sub));
@@ -150,6 +150,12 @@ impl Object {
     #[must_use]
     pub const fn real(self, value: f32) -> Object {
         self.default(DefaultValue::Real(value))
+    }
+
+    /// Default of a REAL64.
+    #[must_use]
+    pub const fn real64(self, value: f64) -> Object {
+        self.default(DefaultValue::Integer(value.to_bits().cast_signed()))
     }
 
     /// Sets the limits.

@@ -13,14 +13,22 @@ pub enum Rule {
     ErrorEntry,
     /// 1005h, COB-ID of SYNC.
     SyncCobId,
+    /// 1005h of a device that can produce SYNC.
+    SyncProducer,
     /// 1006h, communication cycle period.
     SyncPeriod,
     /// 1007h, synchronous window length.
     SyncWindow,
+    /// 100Ch, guard time.
+    GuardTime,
+    /// 100Dh, life time factor.
+    LifeTimeFactor,
     /// 1010h:1 and up, store parameters.
     Store,
     /// 1011h:1 and up, restore default parameters.
     Restore,
+    /// 1012h, COB-ID of the time stamp.
+    TimeCobId,
     /// 1014h, COB-ID of EMCY.
     EmcyCobId,
     /// 1015h, inhibit time of EMCY.
@@ -72,8 +80,11 @@ impl Rule {
             (0x1005, 0) => Rule::SyncCobId,
             (0x1006, 0) => Rule::SyncPeriod,
             (0x1007, 0) => Rule::SyncWindow,
+            (0x100C, 0) => Rule::GuardTime,
+            (0x100D, 0) => Rule::LifeTimeFactor,
             (0x1010, 1..) => Rule::Store,
             (0x1011, 1..) => Rule::Restore,
+            (0x1012, 0) => Rule::TimeCobId,
             (0x1014, 0) => Rule::EmcyCobId,
             (0x1015, 0) => Rule::EmcyInhibit,
             (0x1016, 1..) => Rule::HeartbeatWatch,
@@ -138,6 +149,10 @@ impl Rule {
             Rule::StoreCalibration => 24,
             Rule::Setting => 25,
             Rule::Application => 26,
+            Rule::SyncProducer => 27,
+            Rule::TimeCobId => 28,
+            Rule::GuardTime => 29,
+            Rule::LifeTimeFactor => 30,
             Rule::EventTimerOf(number) => 0x100 | number as u16,
         }
     }
@@ -157,6 +172,7 @@ impl Rule {
         match self {
             Rule::Plain | Rule::Application => None,
             Rule::ErrorCount
+            | Rule::LifeTimeFactor
             | Rule::SyncOverflow
             | Rule::ProgramControl
             | Rule::PdoType
@@ -164,6 +180,7 @@ impl Rule {
             | Rule::PdoCount
             | Rule::Setting => Some(1),
             Rule::EmcyInhibit
+            | Rule::GuardTime
             | Rule::HeartbeatTime
             | Rule::PdoInhibit
             | Rule::PdoEventTimer

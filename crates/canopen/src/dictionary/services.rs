@@ -3,13 +3,9 @@
 use super::compile::can_be_multiplexed;
 use super::{Object, Rule};
 
-/// The services of a [`Device`](crate::Device), as far as they depend on its rows. The code of a service that the rows
-/// lack is not linked.
-///
-/// TPDOs, RPDOs, the heartbeat consumer and the multiplexed TPDO are not in the set: the numbers in
-/// [`Sizes`](super::Sizes) decide on them.
+/// The services of a [`Device`](crate::Device). The code of a service outside the set is not linked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Services(u16);
+pub struct Services(u32);
 
 impl Services {
     /// SYNC consumer: the rows have 1005h. Without it, a PDO has no synchronous transmission type.
@@ -21,23 +17,50 @@ impl Services {
     pub const STORE: Services = Services(1 << 2);
     /// Multiplexed RPDOs: the rows have an RPDO that can be [`multiplexed`](crate::objects::multiplexed).
     pub const MULTIPLEXED_RPDO: Services = Services(1 << 3);
+    /// Faults, the error register (1001h), the error behaviour (1029h), and jobs of the caller, such as storing a
+    /// configuration of LSS. Every [`Device`](crate::Device) has them but a [`ServiceDevice`](crate::ServiceDevice).
+    pub const FAULTS: Services = Services(1 << 4);
+    /// Program control (CiA 302-3): the rows have 1F51h.
+    pub const PROGRAM_CONTROL: Services = Services(1 << 5);
+    /// Start without a command of the master: the rows have 1F80h.
+    pub const SELF_START: Services = Services(1 << 6);
+
+    /// SYNC producer: the rows are those of [`sync_producer`](crate::objects::sync_producer).
+    pub const SYNC_PRODUCER: Services = Services(1 << 7);
+    /// Time stamp, consumer and producer: the rows have 1012h.
+    pub const TIME: Services = Services(1 << 8);
+
+    /// Node guarding and life guarding: the rows have 100Ch.
+    pub const GUARDING: Services = Services(1 << 9);
+
+    /// TPDOs, RPDOs, the heartbeat consumer and the multiplexed TPDO follow from the numbers in
+    /// [`Sizes`](super::Sizes).
+    pub(crate) const TPDO: Services = Services(1 << 16);
+    pub(crate) const RPDO: Services = Services(1 << 17);
+    pub(crate) const HEARTBEAT_CONSUMER: Services = Services(1 << 18);
+    pub(crate) const MULTIPLEXED_TPDO: Services = Services(1 << 19);
 
     /// None of these services.
     pub const NONE: Services = Services(0);
     /// All services, for a device whose rows are not known when it is compiled.
-    pub const ALL: Services = Services(0xF);
+    pub const ALL: Services = Services(0xFFFF);
 
     /// The services that these rows ask for.
     #[must_use]
     #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
     pub const fn of(rows: &[Object]) -> Services {
-        let (mut services, mut i) = (Services::NONE, 0);
+        let (mut services, mut i) = (Services::FAULTS, 0);
         while i < rows.len() {
             let row = &rows[i];
             services = services.with(match row.rule {
                 Rule::SyncCobId => Services::SYNC,
                 Rule::EmcyCobId => Services::EMCY,
                 Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting => Services::STORE,
+                Rule::SyncProducer => Services::SYNC.with(Services::SYNC_PRODUCER),
+                Rule::GuardTime => Services::GUARDING,
+                Rule::TimeCobId => Services::TIME,
+                Rule::ProgramControl => Services::PROGRAM_CONTROL,
+                Rule::StartUp => Services::SELF_START,
                 Rule::PdoCount if row.index < 0x1800 && can_be_multiplexed(row) => Services::MULTIPLEXED_RPDO,
                 _ => Services::NONE,
             });
@@ -52,19 +75,25 @@ impl Services {
         Services(self.0 | other.0)
     }
 
+    /// The set, and another service if a condition is met.
+    pub(crate) const fn with_if(self, condition: bool, other: Services) -> Services {
+        if condition { self.with(other) } else { self }
+    }
+
     /// Whether all services of `other` are in the set.
     #[must_use]
     pub const fn contains(self, other: Services) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// The set as a number, the last parameter of [`Device`](crate::Device).
+    /// The set as a number, for [`device!`](crate::device!).
+    #[doc(hidden)]
     #[must_use]
-    pub const fn bits(self) -> u16 {
+    pub const fn bits(self) -> u32 {
         self.0
     }
 
-    pub(crate) const fn from_bits(bits: u16) -> Services {
+    pub(crate) const fn from_bits(bits: u32) -> Services {
         Services(bits)
     }
 }

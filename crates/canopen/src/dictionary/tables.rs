@@ -15,10 +15,9 @@
 
 use super::entry::{Attributes, little_endian};
 use super::fail::fail;
-use super::{Entry, Field};
+use super::{Direction, Entry, Field};
 use crate::NodeId;
 use crate::copy::copy;
-use crate::pdo::Direction;
 use crate::sdo::Abort;
 
 /// Consecutive objects of the same shape.

@@ -1,11 +1,11 @@
 //! Faults: communication faults, which the device detects itself, and faults of the application.
 
-use crate::ErrorClass;
 use crate::dictionary::Group;
 
 /// A fault that the device signals by EMCY.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Fault {
     /// A received frame was lost (8110h).
     Overrun,
@@ -21,6 +21,8 @@ pub enum Fault {
     MpdoNotTaken,
     /// The heartbeat of a node is missing (8130h). The number is the entry of 1016h, from 0.
     Heartbeat(u8),
+    /// A guarding master has sent no remote frame within the life time (8130h).
+    LifeGuard,
     /// The RPDO with this number, 1 to 512, was shorter than its mapping and is not processed (8210h).
     RpdoTooShort(u16),
     /// The RPDO with this number was longer than its mapping (8220h).
@@ -67,6 +69,17 @@ impl Condition {
     }
 }
 
+/// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorClass(pub u8);
+
+impl ErrorClass {
+    /// Communication errors, sub-index 1.
+    pub const COMMUNICATION: ErrorClass = ErrorClass(1);
+    /// Errors of the device itself: sub-index 2, the first sub-index for a device profile or the manufacturer.
+    pub const DEVICE: ErrorClass = ErrorClass(2);
+}
+
 /// First byte of the error field of an EMCY about stored data: the values that are in use instead.
 const OLDER_HOLDS: u16 = 1;
 const DEFAULTS_HOLD: u16 = 2;
@@ -77,7 +90,7 @@ const COMMUNICATION: u8 = 1 << 4;
 
 impl Fault {
     /// The faults that can be active only once, in the order of their bits: communication, then the storage groups.
-    const SINGLE: [Fault; 12] = [
+    const SINGLE: [Fault; 13] = [
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
@@ -90,9 +103,10 @@ impl Fault {
         Fault::OlderData(Group::Communication),
         Fault::OlderData(Group::Application),
         Fault::OlderData(Group::Calibration),
+        Fault::LifeGuard,
     ];
     /// The bits of the communication faults in that list.
-    const OF_COMMUNICATION: u16 = 0x3F;
+    const OF_COMMUNICATION: u16 = 0x3F | 1 << 12;
 
     /// The bit of a fault that can be active only once; `None` for a fault with a number.
     const fn bit(self) -> Option<u8> {
@@ -105,6 +119,7 @@ impl Fault {
             Fault::MpdoNotTaken => Some(5),
             Fault::StoredData(group) => Some(6 + group as u8),
             Fault::OlderData(group) => Some(9 + group as u8),
+            Fault::LifeGuard => Some(12),
             _ => None,
         }
     }
@@ -121,7 +136,7 @@ impl Fault {
             Fault::SyncMissing => 0x8100,
             Fault::SyncLength => 0x8240,
             Fault::MpdoNotTaken => 0x8230,
-            Fault::Heartbeat(_) => 0x8130,
+            Fault::Heartbeat(_) | Fault::LifeGuard => 0x8130,
             Fault::RpdoTooShort(_) => 0x8210,
             Fault::RpdoTooLong(_) => 0x8220,
             Fault::RpdoDeadline(_) => 0x8250,
@@ -137,7 +152,7 @@ impl Fault {
         let [low, high] = self.detail().to_le_bytes();
         let (register, class) = match self {
             Fault::StoredData(_) | Fault::OlderData(_) => (0, Some(ErrorClass::DEVICE)),
-            Fault::Heartbeat(_) => (COMMUNICATION, Some(ErrorClass::COMMUNICATION)),
+            Fault::Heartbeat(_) | Fault::LifeGuard => (COMMUNICATION, Some(ErrorClass::COMMUNICATION)),
             _ => (COMMUNICATION, None),
         };
         Condition { code, register, detail: [low, high, 0, 0, 0], class }

@@ -17,10 +17,12 @@ impl History {
         History { count: 0, newest: 0, errors: [[0; 4]; DEPTH as usize] }
     }
 
-    pub(crate) fn push(&mut self, code: u16) {
+    /// Adds an error with its code and what is known about it.
+    pub(crate) fn push(&mut self, code: u16, detail: [u8; 2]) {
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.errors.get_mut(usize::from(self.newest)) {
-            *place = u32::from(code).to_le_bytes();
+            let ([low, high], [first, second]) = (code.to_le_bytes(), detail);
+            *place = [low, high, first, second];
         }
         self.count = (self.count + 1).min(DEPTH);
     }
@@ -48,10 +50,10 @@ mod tests {
     #[test]
     fn ten_errors_newest_first() {
         let mut history = History::new();
-        (1..=12).for_each(|code| history.push(code));
+        (1..=12).for_each(|code| history.push(code, [1, 2]));
         assert_eq!(*history.count(), 10);
-        assert_eq!(history.error(1), Some(&[12, 0, 0, 0]));
-        assert_eq!(history.error(10), Some(&[3, 0, 0, 0]));
+        assert_eq!(history.error(1), Some(&[12, 0, 1, 2]));
+        assert_eq!(history.error(10), Some(&[3, 0, 1, 2]));
         assert_eq!(history.error(11), None);
         assert_eq!(history.error(0), None);
         history.clear();

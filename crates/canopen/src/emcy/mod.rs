@@ -6,6 +6,6 @@ mod message;
 mod producer;
 
 use fault::FaultSet;
-pub use fault::{Condition, Fault};
+pub use fault::{Condition, ErrorClass, Fault};
 pub use message::Message;
 pub(crate) use producer::{OFF, Producer, check_cob_id};

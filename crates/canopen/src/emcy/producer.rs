@@ -1,10 +1,10 @@
 //! The EMCY producer: keeps the set of active faults, sends their changes, and keeps the list of the errors sent.
 
 use super::history::History;
-use super::{Condition, Fault, FaultSet, Message};
+use super::{Condition, ErrorClass, Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::{Context, RETRY};
-use crate::{CobId, Duration, ErrorClass, Frame, Instant, Transmit};
+use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
@@ -13,6 +13,9 @@ const WAITING: usize = 8;
 
 /// The COB-ID (1014h) of a device without EMCY: bit 31 is set.
 pub(crate) const OFF: u32 = 1 << 31;
+
+/// The error field of a fault of the application; `None` for the one of its condition.
+pub(crate) type Detail = Option<[u8; 5]>;
 
 /// The active faults, their history and the waiting messages.
 #[derive(Debug)]
@@ -76,28 +79,29 @@ impl Producer {
     }
 
     /// After a reset: clears the history, and reports the faults that are still active again.
-    pub(crate) fn restart(&mut self, now: Instant) {
+    pub(crate) fn restart(&mut self, details: impl Fn(u8) -> Detail, now: Instant) {
         self.history.clear();
         self.forget_waiting();
         self.errors = 0;
         let active = core::mem::take(&mut self.active);
-        self.raise_singles(active, now);
+        self.raise_singles(active, details, now);
     }
 
     // Not inlined: two callers, and much code.
     #[inline(never)]
-    fn raise_singles(&mut self, faults: FaultSet, now: Instant) {
+    fn raise_singles(&mut self, faults: FaultSet, details: impl Fn(u8) -> Detail, now: Instant) {
         for fault in faults.singles() {
             self.active.insert(fault);
-            self.errors |= self.repeat(fault, now);
+            let detail = if let Fault::Application(number) = fault { details(number) } else { None };
+            self.errors |= self.repeat(fault, detail, now);
         }
     }
 
     /// Sets a fault. Returns whether the fault is new.
-    pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
+    pub(crate) fn raise(&mut self, fault: Fault, detail: Detail, now: Instant) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
-            self.errors |= self.repeat(fault, now);
+            self.errors |= self.repeat(fault, detail, now);
         }
         is_new
     }
@@ -127,16 +131,16 @@ impl Producer {
 
     /// Reports an active fault, and returns the bit of its class.
     #[inline(never)]
-    pub(crate) fn repeat(&mut self, fault: Fault, now: Instant) -> u8 {
+    pub(crate) fn repeat(&mut self, fault: Fault, own: Detail, now: Instant) -> u8 {
         let Condition { code, detail, class, .. } = fault.condition(self.conditions);
-        self.report(code, detail, now);
+        self.report(code, own.unwrap_or(detail), now);
         class.map_or(0, error_bit)
     }
 
     /// Reports the active faults again, without those of heartbeats and RPDOs. They are no new errors.
-    pub(crate) fn repeat_singles(&mut self, now: Instant) {
+    pub(crate) fn repeat_singles(&mut self, details: impl Fn(u8) -> Detail, now: Instant) {
         let errors = self.errors;
-        self.raise_singles(self.active, now);
+        self.raise_singles(self.active, details, now);
         self.errors = errors;
     }
 
@@ -204,7 +208,8 @@ impl Producer {
     }
 
     /// Sends the waiting messages. Must be called only in NMT states with EMCY; in other states, messages keep waiting.
-    pub(crate) fn poll(&mut self, context: &mut Context<'_, impl Transmit>) {
+    /// `lists_detail`: whether the list of errors has the start of the error field.
+    pub(crate) fn poll(&mut self, lists_detail: bool, context: &mut Context<'_, impl Transmit>) {
         if context.now < self.due {
             return;
         }
@@ -215,7 +220,8 @@ impl Producer {
                 return;
             }
             if message.code != 0 {
-                self.history.push(message.code);
+                let [first, second, ..] = message.detail;
+                self.history.push(message.code, if lists_detail { [first, second] } else { [0; 2] });
             }
             let _ = self.waiting.pop_front();
             self.sent_at = context.now;

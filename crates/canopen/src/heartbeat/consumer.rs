@@ -1,5 +1,7 @@
 //! The heartbeat consumer (CiA 301, 7.2.8.2.2.2): monitors the heartbeats of other nodes.
 
+use crate::array::Array;
+use crate::nmt::State;
 use crate::{CanId, Duration, Frame, Instant, NodeId};
 
 /// An entry of 1016h: a node, and the longest time between two of its heartbeats.
@@ -33,70 +35,99 @@ pub(crate) enum Change {
     Back(u8),
 }
 
+/// A monitored node, or an unused entry.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+pub struct Monitored {
     watch: Option<Watch>,
     /// When the heartbeat is missing. `NEVER` until the first heartbeat, and while the heartbeat is lost.
     due: Instant,
     is_lost: bool,
+    /// The state in the last heartbeat; `None` before the first one, and while the heartbeat is lost.
+    state: Option<State>,
 }
 
-/// Monitors up to `W` nodes. The monitoring of a node begins with its first heartbeat.
+impl Monitored {
+    const fn new(watch: Option<Watch>) -> Monitored {
+        Monitored { watch, due: Instant::NEVER, is_lost: false, state: None }
+    }
+}
+
+/// Monitors nodes, as many as `E` has elements. The monitoring of a node begins with its first heartbeat.
 #[derive(Debug)]
-pub(crate) struct Consumer<const W: usize> {
-    entries: [Entry; W],
+pub(crate) struct Consumer<E> {
+    entries: E,
 }
 
-impl<const W: usize> Consumer<W> {
-    pub(crate) const fn new() -> Consumer<W> {
-        let unused = Entry { watch: None, due: Instant::NEVER, is_lost: false };
-        Consumer { entries: [unused; W] }
+impl<E: Array<Monitored>> Consumer<E> {
+    pub(crate) fn new() -> Consumer<E> {
+        Consumer { entries: E::filled(|| Monitored::new(None)) }
     }
 
     /// Sets an entry of 1016h, from 0, and restarts its monitoring. Returns whether the old node of the entry was lost.
     pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) -> bool {
-        let fresh = Entry { watch, due: Instant::NEVER, is_lost: false };
-        self.entries.get_mut(number).is_some_and(|entry| core::mem::replace(entry, fresh).is_lost)
+        let entry = self.entries.as_mut().get_mut(number);
+        entry.is_some_and(|entry| core::mem::replace(entry, Monitored::new(watch)).is_lost)
+    }
+
+    /// How many nodes can be monitored.
+    pub(crate) fn len(&self) -> usize {
+        self.entries.as_ref().len()
     }
 
     /// CAN-IDs of the monitored heartbeats.
     pub(crate) fn ids(&self) -> impl Iterator<Item = CanId> {
-        self.entries.iter().filter_map(|entry| entry.watch.map(Watch::id))
+        self.entries.as_ref().iter().filter_map(|entry| entry.watch.map(Watch::id))
     }
 
     /// The monitored nodes, entry by entry.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = Option<NodeId>> {
-        self.entries.iter().map(|entry| entry.watch.map(|watch| watch.node))
+        self.entries.as_ref().iter().map(|entry| entry.watch.map(|watch| watch.node))
     }
 
-    /// Takes a heartbeat or a boot-up message.
-    pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Option<Change> {
-        if frame.len() != 1 || frame.is_remote() {
-            return None;
-        }
-        for (number, entry) in (0..).zip(&mut self.entries) {
+    /// Takes a heartbeat or a boot-up message. `changed` gets a new state of a node, and every boot-up.
+    pub(crate) fn take(
+        &mut self,
+        frame: &Frame,
+        now: Instant,
+        changed: impl FnOnce(NodeId, State),
+    ) -> Option<Change> {
+        let &[code] = frame.data() else { return None };
+        let state = State::from_code(code);
+        for (number, entry) in (0..).zip(self.entries.as_mut()) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
                 entry.due = now.plus(Duration::from_millis(watch.period.into()));
+                let before = core::mem::replace(&mut entry.state, state);
+                if let Some(state) =
+                    state.filter(|state| before != Some(*state) || *state == State::Initialising)
+                {
+                    changed(watch.node, state);
+                }
                 return core::mem::take(&mut entry.is_lost).then_some(Change::Back(number));
             }
         }
         None
     }
 
+    /// The state of a monitored node; `None` before its first heartbeat, and while its heartbeat is lost.
+    pub(crate) fn state(&self, node: NodeId) -> Option<State> {
+        let mut entries = self.entries.as_ref().iter();
+        entries.find(|entry| entry.watch.is_some_and(|watch| watch.node == node))?.state
+    }
+
     /// The entries whose heartbeat is lost, from 0.
     pub(crate) fn lost(&self) -> impl Iterator<Item = u8> {
-        (0..).zip(&self.entries).filter(|(_, entry)| entry.is_lost).map(|(number, _)| number)
+        (0..).zip(self.entries.as_ref()).filter(|(_, entry)| entry.is_lost).map(|(number, _)| number)
     }
 
     /// The next instant at which a heartbeat is missing.
     pub(crate) fn due(&self) -> Instant {
-        self.entries.iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
+        self.entries.as_ref().iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
     }
 
     /// Reports one missing heartbeat. Must be called until the result is `None`.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
-        let (number, entry) = (0..).zip(&mut self.entries).find(|(_, entry)| now >= entry.due)?;
-        (entry.due, entry.is_lost) = (Instant::NEVER, true);
+        let (number, entry) = (0..).zip(self.entries.as_mut()).find(|(_, entry)| now >= entry.due)?;
+        (entry.due, entry.is_lost, entry.state) = (Instant::NEVER, true, None);
         Some(Change::Lost(number))
     }
 }

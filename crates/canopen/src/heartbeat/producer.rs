@@ -31,6 +31,11 @@ impl Producer {
         }
     }
 
+    /// Whether the heartbeat is switched on: then the device is not guarded (CiA 301, 7.2.8.2).
+    pub(crate) fn is_on(&self) -> bool {
+        self.period != 0
+    }
+
     /// Whether the boot-up message has not been sent yet.
     pub(crate) fn boots_up(&self) -> bool {
         self.boot_up

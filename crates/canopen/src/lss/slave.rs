@@ -71,6 +71,11 @@ impl Slave {
         self.pending
     }
 
+    /// Sets the configuration that the next reset communication activates.
+    pub(crate) fn set_pending(&mut self, pending: Configuration) {
+        self.pending = pending;
+    }
+
     /// After a reset of any kind: back to the waiting state.
     pub(crate) fn reset(&mut self) {
         *self = Slave::new(self.pending);

@@ -1,8 +1,7 @@
 //! The rows of PDOs: whole PDOs, and single rows for PDOs with other properties.
 
 use super::{list, parameter};
-use crate::dictionary::{DefaultValue, Object, Rule, Type, fail};
-use crate::pdo::MappedObject;
+use crate::dictionary::{DefaultValue, MappedObject, Object, Rule, Type, fail};
 
 /// The default COB-ID of PDO `number`, from 1. `base` is 180h for a TPDO and 200h for an RPDO. The PDOs 1 to 4 have a
 /// CAN-ID in the pre-defined connection set (CiA 301, 7.3.5); any other PDO is switched off.

@@ -3,27 +3,6 @@
 use crate::NodeId;
 use crate::sdo::Multiplexer;
 
-/// The addressing mode of a multiplexed PDO: a special number of mapped objects (1600h.., 1A00h..:0).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Addressing {
-    /// 254, source address mode: the frame names an object of the sender.
-    Source,
-    /// 255, destination address mode: the frame names an object of the receiver.
-    Destination,
-}
-
-impl Addressing {
-    /// `None` for an ordinary number of mapped objects.
-    #[must_use]
-    pub const fn from_count(count: u8) -> Option<Addressing> {
-        match count {
-            0xFE => Some(Addressing::Source),
-            0xFF => Some(Addressing::Destination),
-            _ => None,
-        }
-    }
-}
-
 /// The node whose object a frame names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Address {

@@ -3,7 +3,8 @@
 //! The types 0 to 240 accept the data with the next SYNC, the types 254 and 255 at once. With an event timer, the next
 //! frame must arrive before the timer elapses.
 
-use super::{Addressing, Content, Layout, Links, Transmission};
+use super::{Content, Layout, Links};
+use crate::dictionary::{Addressing, Transmission};
 use crate::emcy::Fault;
 use crate::{CanId, Duration, Frame, Instant};
 
@@ -76,7 +77,7 @@ impl RpdoFault {
 
 /// An RPDO. Only valid RPDOs are in the chains.
 #[derive(Debug)]
-pub(crate) struct Rpdo {
+pub struct Rpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
     /// Index of the communication parameter.

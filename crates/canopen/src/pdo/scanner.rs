@@ -5,12 +5,12 @@
 //! triggers the transmission, always of all objects. Without one, each changed object is sent. Entering Operational
 //! sends all objects in both cases.
 
-use super::{Address, Addressing, Layout, Mpdo};
-use crate::dictionary::Field;
+use super::{Address, Layout, Mpdo, ProcessContext};
+use crate::array::Array;
+use crate::dictionary::{Addressing, Field};
 use crate::sdo::Multiplexer;
-use crate::transmit::{ProcessContext, RETRY};
+use crate::transmit::RETRY;
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
-use heapless::Vec;
 
 /// Settings of the multiplexed TPDO, from the dictionary.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl ScannerSettings {
 
 /// A monitored object.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Watched {
+pub struct Watched {
     at: Multiplexer,
     field: Field,
     /// The value that was sent last; `None` before the first transmission.
@@ -48,6 +48,14 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
+    const UNUSED: Watched = Watched {
+        at: Multiplexer { index: 0, sub: 0 },
+        field: Field { offset: 0, size: 0 },
+        sent: None,
+        is_selected: false,
+        is_pending: false,
+    };
+
     pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
         Watched { at, field, sent: None, is_selected: true, is_pending: false }
     }
@@ -61,11 +69,31 @@ impl Watched {
     }
 }
 
-/// The producer of the multiplexed TPDO, with room for `M` objects. Without settings it sends nothing.
+/// A list of at most as many objects as `L` has elements.
 #[derive(Debug)]
-pub(crate) struct Scanner<const M: usize> {
+struct List<L> {
+    memory: L,
+    len: usize,
+}
+
+impl<L: Array<Watched>> List<L> {
+    fn push(&mut self, watched: Watched) {
+        if let Some(free) = self.memory.as_mut().get_mut(self.len) {
+            *free = watched;
+            self.len += 1;
+        }
+    }
+
+    fn iter_mut(&mut self) -> core::slice::IterMut<'_, Watched> {
+        self.memory.as_mut().get_mut(..self.len).unwrap_or_default().iter_mut()
+    }
+}
+
+/// The producer of the multiplexed TPDO, with room for as many objects as `L` has elements. Without settings it sends nothing.
+#[derive(Debug)]
+pub(crate) struct Scanner<L> {
     settings: Option<ScannerSettings>,
-    watched: Vec<Watched, M>,
+    watched: List<L>,
     /// Whether any object waits to be sent.
     is_pending: bool,
     event_due: Instant,
@@ -74,11 +102,11 @@ pub(crate) struct Scanner<const M: usize> {
     inhibited_until: Instant,
 }
 
-impl<const M: usize> Scanner<M> {
-    pub(crate) const fn new() -> Scanner<M> {
+impl<L: Array<Watched>> Scanner<L> {
+    pub(crate) fn new() -> Scanner<L> {
         Scanner {
             settings: None,
-            watched: Vec::new(),
+            watched: List { memory: L::filled(|| Watched::UNUSED), len: 0 },
             is_pending: false,
             event_due: Instant::NEVER,
             sent: Instant::NEVER,
@@ -94,13 +122,13 @@ impl<const M: usize> Scanner<M> {
     /// Takes new settings, and removes all monitored objects.
     pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
         self.settings = settings;
-        self.watched.clear();
+        self.watched.len = 0;
         self.stop();
     }
 
     /// Monitors one more object. Objects beyond the room are ignored.
     pub(crate) fn watch(&mut self, watched: Watched) {
-        let _ = self.watched.push(watched);
+        self.watched.push(watched);
     }
 
     /// Selects the objects to send. An object that is selected for the first time is sent.
@@ -126,7 +154,7 @@ impl<const M: usize> Scanner<M> {
 
     /// Deselects the objects that a TPDO maps.
     pub(crate) fn deselect(&mut self, layout: &Layout) {
-        for watched in &mut self.watched {
+        for watched in self.watched.iter_mut() {
             watched.is_selected &= !layout.contains(watched.field);
         }
     }
@@ -141,7 +169,7 @@ impl<const M: usize> Scanner<M> {
 
     fn send_all(&mut self) {
         self.is_pending = false;
-        for watched in &mut self.watched {
+        for watched in self.watched.iter_mut() {
             watched.is_pending = watched.is_selected;
             self.is_pending |= watched.is_selected;
         }

@@ -7,9 +7,10 @@
 //! A TPDO that sends events is sent when the application has an event, and never because a value has changed. The
 //! inhibit time and the event timer determine when the application is asked for its waiting events.
 
-use super::{Layout, Links, Transmission};
+use super::{Layout, Links, ProcessContext};
+use crate::dictionary::Transmission;
 use crate::sync::Sync;
-use crate::transmit::{ProcessContext, RETRY};
+use crate::transmit::RETRY;
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
@@ -60,7 +61,7 @@ impl Settings {
 /// A TPDO and its timers. Only valid TPDOs are in the chains; for a TPDO that is not valid, only `configure` and `stop`
 /// may be called.
 #[derive(Debug)]
-pub(crate) struct Tpdo {
+pub struct Tpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
     is_valid: bool,

@@ -58,7 +58,7 @@ impl Sender {
     pub(super) fn send(
         &mut self,
         buffer: &[u8; BUFFER],
-        objects: &impl Objects,
+        objects: &mut impl Objects,
         mut send: impl FnMut([u8; 8]) -> bool,
     ) -> Result<(), Abort> {
         let content = self.source.content(buffer, objects)?;

@@ -18,6 +18,7 @@ mod server;
 pub use abort::Abort;
 pub use block::{BlockEnd, BlockSegment, BlockSize};
 pub use bytes::Bytes;
+pub use objects::Part;
 pub(crate) use objects::{BUFFER, Objects, Writable};
 pub use request::{Initiate, Request};
 pub use response::Response;

@@ -2,12 +2,23 @@
 //! a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
+use crate::Instant;
 use crate::copy::copy;
-use crate::{Instant, Part};
 
 /// Size of the buffer in bytes: the longest value, and the longest part of a stream. A multiple of a segment (7), and
 /// of a word (4) for the CRC and for copies.
 pub(crate) const BUFFER: usize = 112;
+
+/// A part of a download to a domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part<'a> {
+    /// The download begins. The number of bytes, if the client announces it.
+    Begin(Option<usize>),
+    /// Some bytes, and the offset of the first one in the domain.
+    Data(usize, &'a [u8]),
+    /// The download is complete, with this number of bytes.
+    End(usize),
+}
 
 /// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,9 +33,11 @@ pub(crate) enum Writable {
 pub(crate) trait Objects {
     /// Whether block uploads are supported.
     const BLOCK_UPLOAD: bool;
+    /// Whether block downloads are supported.
+    const BLOCK_DOWNLOAD: bool;
 
-    /// The value of an entry.
-    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
+    /// The value of an entry. The application may set it before.
+    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry accepts a download, or why it does not.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and applies its effect.
@@ -66,7 +79,7 @@ impl Source {
     pub(super) fn content<'a>(
         &self,
         buffer: &'a [u8; BUFFER],
-        objects: &'a impl Objects,
+        objects: &'a mut impl Objects,
     ) -> Result<&'a [u8], Abort> {
         let content = if self.len <= BUFFER { buffer } else { objects.read(self.at)? };
         content.get(..self.len).ok_or(Abort::General)
@@ -77,7 +90,7 @@ impl Source {
         &self,
         offset: usize,
         buffer: &[u8; BUFFER],
-        objects: &impl Objects,
+        objects: &mut impl Objects,
     ) -> Result<Bytes<7>, Abort> {
         let content = self.content(buffer, objects)?;
         Ok(Bytes::from_slice(content.get(offset..).unwrap_or(&[])))

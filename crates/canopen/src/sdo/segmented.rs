@@ -22,7 +22,7 @@ impl Upload {
         &mut self,
         requested: bool,
         buffer: &[u8; BUFFER],
-        objects: &impl Objects,
+        objects: &mut impl Objects,
     ) -> Result<Segment, Abort> {
         if requested != self.toggle {
             return Err(Abort::Toggle);

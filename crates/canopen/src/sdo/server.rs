@@ -8,6 +8,7 @@ use super::objects::BUFFER;
 use super::segmented::{Download, Upload};
 use super::{Abort, BlockSegment, BlockSize, Multiplexer, Objects, Response};
 use crate::{Duration, Instant};
+use core::marker::PhantomData;
 
 /// How long a client may be silent during a transfer. CiA 301 leaves the time to the device.
 const TIME_OUT: Duration = Duration::from_millis(1000);
@@ -17,7 +18,7 @@ const BLOCK_PAUSE: Duration = Duration::from_millis(300);
 
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
-pub(crate) struct Server {
+pub(crate) struct Server<O> {
     transfer: Transfer,
     multiplexer: Multiplexer,
     /// For an upload, a copy of the value; for a download, the data received so far.
@@ -29,6 +30,7 @@ pub(crate) struct Server {
     is_answered: bool,
     /// The frame of the last response.
     reply: [u8; 8],
+    objects: PhantomData<fn(&O)>,
 }
 
 #[derive(Debug)]
@@ -45,8 +47,8 @@ enum Transfer {
 /// Whether there is a reply now.
 type Answer = Result<bool, Abort>;
 
-impl Server {
-    pub(crate) const fn new() -> Server {
+impl<O: Objects> Server<O> {
+    pub(crate) const fn new() -> Server<O> {
         Server {
             transfer: Transfer::Idle,
             multiplexer: Multiplexer { index: 0, sub: 0 },
@@ -55,6 +57,7 @@ impl Server {
             previous: [0; 8],
             is_answered: false,
             reply: [0; 8],
+            objects: PhantomData,
         }
     }
 
@@ -75,12 +78,13 @@ impl Server {
 
     /// Whether a block download is under way.
     pub(crate) fn takes_block(&self) -> bool {
-        matches!(self.transfer, Transfer::BlockDownload(_))
+        O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::BlockDownload(_))
     }
 
     /// Whether the client is sending a block.
     pub(crate) fn is_within_block(&self) -> bool {
-        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.is_within_block())
+        O::BLOCK_DOWNLOAD
+            && matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.is_within_block())
     }
 
     /// The next deadline of [`expire`](Server::expire).
@@ -117,7 +121,7 @@ impl Server {
     // Requests that begin a download or an upload are the most frequent ones. They are not part of a series, so they
     // are neither compared with the request before nor remembered.
     #[inline]
-    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
         let command = frame[0] >> 5;
         if !matches!(command, 1 | 2) || self.expects_block_segments() {
             self.answer_in_series(frame, objects, now)
@@ -130,7 +134,7 @@ impl Server {
 
     /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
-    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
+    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
         let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
@@ -154,13 +158,17 @@ impl Server {
     }
 
     fn expects_block_segments(&self) -> bool {
-        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.expects_segments())
+        O::BLOCK_DOWNLOAD
+            && matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.expects_segments())
     }
 
     /// The frame as a segment of a block download. Within a block, every frame is a segment, unless its first byte is
     /// the one of an abort message. After the last block, only a repetition of the last segment is one.
     fn block_segment(&self, frame: &[u8; 8], is_repeated: bool) -> Option<BlockSegment> {
         let Transfer::BlockDownload(receiver) = &self.transfer else { return None };
+        if !O::BLOCK_DOWNLOAD {
+            return None;
+        }
         let segment = BlockSegment::parse(*frame)?;
         (receiver.expects_segments() || is_repeated).then_some(segment)
     }
@@ -174,7 +182,7 @@ impl Server {
     }
 
     /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
-    fn conclude(&mut self, answer: Answer, objects: &mut impl Objects, now: Instant) -> bool {
+    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Instant) -> bool {
         if answer == Ok(true) && objects.take_deferred() {
             self.transfer = Transfer::Deferred;
             return self.settle(Ok(false), now);
@@ -200,7 +208,7 @@ impl Server {
         }
         match &mut self.transfer {
             Transfer::BlockDownload(receiver)
-                if receiver.is_within_block() && now < self.active.plus(TIME_OUT) =>
+                if O::BLOCK_DOWNLOAD && receiver.is_within_block() && now < self.active.plus(TIME_OUT) =>
             {
                 let sequence = receiver.acknowledge();
                 self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
@@ -227,14 +235,14 @@ impl Server {
     /// Whether segments of a block remain to be sent.
     #[inline]
     pub(crate) fn is_sending(&self) -> bool {
-        matches!(&self.transfer, Transfer::BlockUpload(sender) if sender.is_sending())
+        O::BLOCK_UPLOAD && matches!(&self.transfer, Transfer::BlockUpload(sender) if sender.is_sending())
     }
 
     /// Sends segments of a block as long as `send` accepts them. Returns whether there is a reply, which is an abort
     /// message.
     pub(crate) fn send_block(
         &mut self,
-        objects: &impl Objects,
+        objects: &mut O,
         now: Instant,
         send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {

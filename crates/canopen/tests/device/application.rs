@@ -93,6 +93,10 @@ impl Application for Numbers {
         self.is_full.map_or(Ok(()), Err)
     }
 
+    fn switches_pdos(&self, entry: &Entry) -> bool {
+        entry.index() == 0x6201
+    }
+
     fn sends_events(&self, tpdo: u16) -> bool {
         tpdo == self.event_tpdo
     }

@@ -1,7 +1,7 @@
 //! A device without an application, and a queue that keeps all frames.
 
 use canopen::sdo::Multiplexer;
-use canopen::{Application, Device, Frame, Instant, QueueFull, Transmit};
+use canopen::{Application, Definition, Device, Frame, Instant, QueueFull, Transmit};
 
 use crate::exchange;
 
@@ -46,16 +46,8 @@ impl Transmit for Sent {
 }
 
 /// Writes a value by SDO; the abort code if the device refuses.
-pub(crate) fn download<
-    A: Application,
-    const N: usize,
-    const T: usize,
-    const R: usize,
-    const W: usize,
-    const M: usize,
-    const S: u16,
->(
-    device: &mut Device<A, N, T, R, W, M, S>,
+pub(crate) fn download<D: Definition>(
+    device: &mut Device<D>,
     (index, sub): (u16, u8),
     bytes: &[u8],
     now: Instant,

@@ -70,6 +70,10 @@ impl Application for Choice {
         is_event
     }
 
+    fn switches_pdos(&self, entry: &Entry) -> bool {
+        entry.index() == 0x2010
+    }
+
     fn broadcasts(&self, _: Multiplexer, _: &[u8]) -> bool {
         self.chosen
     }

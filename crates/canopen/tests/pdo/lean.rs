@@ -54,8 +54,14 @@ fn operational<A: Application>(application: A) -> (Lean<A>, Sent) {
 
 #[test]
 fn the_rows_decide_on_the_services() {
-    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::NONE, 0));
-    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (Services::ALL, 2));
+    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::FAULTS, 0));
+    let multiplexed =
+        [Services::FAULTS, Services::SYNC, Services::EMCY, Services::STORE, Services::MULTIPLEXED_RPDO];
+    let expected = multiplexed.into_iter().fold(Services::NONE, Services::with);
+    assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (expected, 2));
+    let other = [Services::of(&[objects::start_up()]), Services::of(&[objects::program_control()[1]])];
+    let expected = [Services::SELF_START, Services::PROGRAM_CONTROL].map(|own| own.with(Services::FAULTS));
+    assert_eq!(other, expected);
 }
 
 #[test]
@@ -144,4 +150,34 @@ fn an_sdo_request_does_not_delay_process_data_that_is_due() {
     let upload = Frame::new(0x600 | u16::from(ID), &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap();
     let _ = device.on_frame(&upload, Instant(10_002), &mut sent);
     assert_eq!(sent.0.iter().map(Frame::id).collect::<Vec<_>>(), [0x185, 0x585]);
+}
+
+/// An application that leaves out what CiA 301 and CiA 305 leave to the device.
+struct Short;
+
+impl Application for Short {
+    const BLOCK_UPLOAD: bool = false;
+    const BLOCK_DOWNLOAD: bool = false;
+    const LSS: bool = false;
+}
+
+#[test]
+fn block_transfers_and_lss_can_be_left_out() {
+    let (mut device, mut sent) = operational(Short);
+    let mut answer = |id, data: [u8; 8]| {
+        sent.0.clear();
+        let _ = device.on_frame(&Frame::new(id, &data).unwrap(), Instant(5), &mut sent);
+        sent.0.iter().map(|frame| frame.data().to_vec()).collect::<Vec<_>>()
+    };
+    let refused = |index: u16| {
+        let [low, high] = index.to_le_bytes();
+        vec![vec![0x80, low, high, 0, 0x01, 0, 0x04, 0x05]]
+    };
+    let request = 0x600 + u16::from(ID);
+    assert_eq!(answer(request, [0xC6, 0x17, 0x10, 0, 2, 0, 0, 0]), refused(0x1017), "block download");
+    assert_eq!(answer(request, [0xA4, 0x00, 0x10, 0, 127, 0, 0, 0]), refused(0x1000), "block upload");
+    assert_eq!(answer(0x7E5, [0x04, 1, 0, 0, 0, 0, 0, 0]), Vec::<Vec<u8>>::new(), "LSS: configuration state");
+    assert_eq!(answer(0x7E5, [0x5E, 0, 0, 0, 0, 0, 0, 0]), Vec::<Vec<u8>>::new(), "LSS: node-ID");
+    assert_eq!(answer(request, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0])[0][..4], [0x43, 0x00, 0x10, 0]);
+    assert!(device.service_ids().all(|id| id.get() != 0x7E5));
 }

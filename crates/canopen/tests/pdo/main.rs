@@ -5,6 +5,7 @@ mod deadlines;
 #[allow(dead_code)] // These tests only write.
 #[path = "../exchange/mod.rs"]
 mod exchange;
+mod handled;
 mod interlocks;
 mod lean;
 mod many;

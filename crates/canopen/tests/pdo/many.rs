@@ -1,7 +1,9 @@
 //! The most PDOs and heartbeats that CiA 301 allows: 512 PDOs in each direction, and 127 heartbeats.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Tables, Type};
-use canopen::{Device, Duration, Fault, Frame, Instant, NodeId};
+use canopen::dictionary::{
+    self, Access, DefaultValue, Dictionary, Mapping, Object, Services, Sizes, Tables, Type,
+};
+use canopen::{Duration, Fault, Frame, Instant, NodeId};
 
 use crate::bench::{ID, Sent, download};
 
@@ -11,7 +13,9 @@ const TPDO: u16 = 0x181;
 const RPDO: u16 = 0x381;
 const NOW: Instant = Instant(1_000_000);
 
-type Node = Device<Recorder, 65_000, 512, 512, 127, 0>;
+const ROOM: Sizes =
+    Sizes { image: 65_000, tpdos: 512, rpdos: 512, watches: 127, scanned: 0, services: Services::ALL };
+type Node = canopen::device!(Recorder, room: ROOM);
 
 /// Records the calls of the application.
 #[derive(Default)]

@@ -79,7 +79,7 @@ pub const PROGRAM_STATE_ROWS: &[Object] = &[
 pub const LOST_EVENTS: u16 = 0x2001;
 
 /// Number of kinds of lost events: sub-indexes 1 to this one.
-pub const LOST_EVENT_KINDS: u8 = 9;
+pub const LOST_EVENT_KINDS: u8 = 10;
 
 const fn count(sub: u8, name: &'static str) -> Object {
     Object::new(LOST_EVENTS, sub, name, Type::Unsigned32, Access::ReadOnly)
@@ -98,6 +98,7 @@ pub const LOST_EVENT_ROWS: &[Object] = &[
     count(7, "Writes to the backup memory"),
     count(8, "Flash operations"),
     count(9, "Resets of the CAN controller"),
+    count(10, "Flash operations refused by a low supply"),
 ];
 
 /// Index of the object about the parameter memory.

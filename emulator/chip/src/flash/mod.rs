@@ -45,6 +45,7 @@ const CR_LOCK: u32 = 31;
 const CR_WRITABLE: u32 = 0x0300_037F;
 
 const OPTCR_LOCK: u32 = 0;
+const OPTCR_BOR: u32 = 2;
 const OPTCR_STRT: u32 = 1;
 const OPTCR_WRITABLE: u32 = 0x0FFF_FFEC;
 /// The first of the nWRP bits: a sector is protected while its bit is 0.
@@ -142,6 +143,17 @@ impl Flash {
     /// Sectors that are write protected, bit 0 for sector 0.
     pub fn write_protected(&self) -> u32 {
         !field(self.optcr, OPTCR_NWRP, 12) & 0xFFF
+    }
+
+    /// The supply in volts below which the chip is held in reset: the level of BOR, or that of the power-down reset
+    /// (RM0390 section 3.6.1, BOR_LEV; DS10693, embedded reset and power control block characteristics).
+    pub(crate) fn reset_level(&self) -> f64 {
+        [2.7, 2.4, 2.1, 1.7][field(self.optcr, OPTCR_BOR, 2) as usize]
+    }
+
+    /// Whether an operation is under way with a parallelism of 32 bits or more.
+    pub(crate) fn works_by_words(&self, now: Time) -> bool {
+        now < self.busy_until && field(self.cr, 8, 2) >= 2
     }
 
     /// A reset. A reset in the middle of an erase leaves the sector torn.

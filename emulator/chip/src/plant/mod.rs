@@ -23,12 +23,16 @@ use signal::Stimulus;
 pub use spec::SpecError;
 pub use table::{Table, TableError};
 
-/// The quantities that the sensors measure, and the faults.
+/// The supply of the chip in volts.
+const SUPPLY: f64 = 3.3;
+
+/// The quantities that the sensors measure, the supply, and the faults.
 #[derive(Clone, Debug)]
 pub struct Plant {
     pressure: Stimulus,
     temperature: Stimulus,
     thermistor: Stimulus,
+    supply: Stimulus,
     shaft: Shaft,
     buttons: [Button; BUTTONS],
     faults: Vec<Fault>,
@@ -37,7 +41,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// No pressure, 25 degrees Celsius everywhere, the shaft at rest at 0, an encoder with `encoder_lines` lines, no
+    /// No pressure, 25 degrees Celsius everywhere, a supply of 3.3 V, the shaft at rest at 0, an encoder with `encoder_lines` lines, no
     /// button pressed.
     pub(crate) fn new(encoder_lines: u32) -> Self {
         let still = |value| Stimulus::new(Signal::Constant(value), Time::ZERO);
@@ -45,6 +49,7 @@ impl Plant {
             pressure: still(0.0),
             temperature: still(298.15),
             thermistor: still(298.15),
+            supply: still(SUPPLY),
             shaft: Shaft::new(encoder_lines),
             buttons: [Button::default(); BUTTONS],
             faults: Vec::new(),
@@ -65,6 +70,11 @@ impl Plant {
     /// Sets the temperature of the thermistor, in kelvin, from `now` on.
     pub fn set_thermistor(&mut self, signal: Signal, now: Time) {
         self.thermistor = Stimulus::new(signal, now);
+    }
+
+    /// Sets the supply of the chip, in volts, from `now` on.
+    pub fn set_supply(&mut self, signal: Signal, now: Time) {
+        self.supply = Stimulus::new(signal, now);
     }
 
     /// Sets the motion of the shaft from `now` on; even motion starts at the current position.
@@ -117,6 +127,11 @@ impl Plant {
         self.thermistor.signal()
     }
 
+    /// The signal of the supply of the chip.
+    pub fn supply_signal(&self) -> &Signal {
+        self.supply.signal()
+    }
+
     /// The motion of the shaft.
     pub fn motion(&self) -> &Motion {
         self.shaft.motion()
@@ -130,6 +145,11 @@ impl Plant {
     /// The true temperature of the thermistor in kelvin.
     pub fn thermistor(&self, now: Time) -> f64 {
         self.thermistor.at(now)
+    }
+
+    /// The supply of the chip in volts.
+    pub fn supply(&self, now: Time) -> f64 {
+        self.supply.at(now)
     }
 
     /// The true pressure in pascal.

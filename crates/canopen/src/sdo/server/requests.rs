@@ -11,10 +11,10 @@ use crate::sdo::{
     Segment, Writable,
 };
 
-impl Server {
+impl<O: Objects> Server<O> {
     /// Takes a request that is not a segment of a block. `is_repeated` is `true` if it is equal to the request before.
     #[inline]
-    pub(super) fn dispatch<O: Objects>(
+    pub(super) fn dispatch(
         &mut self,
         frame: &[u8; 8],
         is_repeated: bool,
@@ -38,6 +38,11 @@ impl Server {
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
+            Request::BlockDownload { at, .. } if !O::BLOCK_DOWNLOAD => {
+                self.begin(at);
+                Err(Abort::Command)
+            }
+            Request::BlockDownloadEnd(_) if !O::BLOCK_DOWNLOAD => Err(Abort::Command),
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
             Request::BlockUpload { at, .. } if !O::BLOCK_UPLOAD => {
@@ -67,12 +72,7 @@ impl Server {
 
     /// Takes the request that begins a download.
     #[inline(never)]
-    pub(super) fn initiate_download(
-        &mut self,
-        frame: &[u8; 8],
-        objects: &mut impl Objects,
-        now: Instant,
-    ) -> bool {
+    pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
         let at = Multiplexer::parse(frame);
         self.begin(at);
         // Most downloads are expedited: their data is used directly from the frame.
@@ -86,12 +86,7 @@ impl Server {
 
     /// Takes the request that begins an upload.
     #[inline(never)]
-    pub(super) fn initiate_upload(
-        &mut self,
-        frame: &[u8; 8],
-        objects: &mut impl Objects,
-        now: Instant,
-    ) -> bool {
+    pub(super) fn initiate_upload(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
         let answer = self.upload(Multiplexer::parse(frame), objects);
         self.settle(answer, now)
     }
@@ -103,7 +98,7 @@ impl Server {
         self.is_answered = false;
     }
 
-    fn upload(&mut self, at: Multiplexer, objects: &mut impl Objects) -> Answer {
+    fn upload(&mut self, at: Multiplexer, objects: &mut O) -> Answer {
         self.begin(at);
         let value = objects.read(at)?;
         if value.len() <= 4 {
@@ -114,7 +109,7 @@ impl Server {
         Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
     }
 
-    fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
+    fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
         let segment = upload.next(toggle, &self.buffer, objects)?;
         if segment.last {
@@ -128,7 +123,7 @@ impl Server {
         &mut self,
         at: Multiplexer,
         frame: &[u8; 8],
-        objects: &mut impl Objects,
+        objects: &mut O,
         now: Instant,
     ) -> Result<(), Abort> {
         let value = match Initiate::parse(frame) {
@@ -142,7 +137,7 @@ impl Server {
         objects.write(at, value.as_slice(), now)
     }
 
-    fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
+    fn download_segment(&mut self, segment: &Segment, objects: &mut O, now: Instant) -> Answer {
         let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
         download.take(segment, &mut self.buffer, objects, now)?;
         if segment.last {
@@ -151,20 +146,14 @@ impl Server {
         Ok(self.set_reply(Response::DownloadedSegment { toggle: segment.toggle }))
     }
 
-    fn block_download(
-        &mut self,
-        at: Multiplexer,
-        crc: bool,
-        size: Option<u32>,
-        objects: &mut impl Objects,
-    ) -> Answer {
+    fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
         self.begin(at);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
-    pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut impl Objects) -> Answer {
+    pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut O) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         if !receiver.take(segment, &mut self.buffer, objects)? {
             return Ok(false);
@@ -173,7 +162,7 @@ impl Server {
         Ok(self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
-    fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
+    fn block_download_end(&mut self, end: BlockEnd, objects: &mut O, now: Instant) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
@@ -181,13 +170,7 @@ impl Server {
     }
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
-    fn block_upload(
-        &mut self,
-        at: Multiplexer,
-        block_size: u8,
-        threshold: u8,
-        objects: &mut impl Objects,
-    ) -> Answer {
+    fn block_upload(&mut self, at: Multiplexer, block_size: u8, threshold: u8, objects: &mut O) -> Answer {
         self.begin(at);
         let source = Source::new(at, objects.read(at)?, &mut self.buffer);
         if source.len() <= usize::from(threshold) {

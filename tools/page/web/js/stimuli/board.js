@@ -11,6 +11,7 @@ const QUANTITIES = [
   { kind: "pressure", name: "Pressure", unit: "bar", low: 0, high: 10, step: 0.01, start: 2.5, factor: 100_000 },
   { kind: "temperature", name: "Temperature of the chip", unit: "°C", low: -40, high: 125, step: 0.5, start: 25, factor: 1, offset: KELVIN },
   { kind: "thermistor", name: "Thermistor", unit: "°C", low: -40, high: 125, step: 0.5, start: 25, factor: 1, offset: KELVIN },
+  { kind: "supply", name: "Supply of the chip", unit: "V", low: 0, high: 3.6, step: 0.05, start: 3.3, factor: 1 },
   { kind: "shaft", name: "Shaft", unit: "revolutions", low: -10, high: 10, step: 0.01, start: 0, factor: 1, rpm: true },
 ];
 

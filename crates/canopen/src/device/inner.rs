@@ -1,0 +1,275 @@
+//! The device behind the SDO server and the LSS slave: values, NMT state, heartbeat, PDO, SYNC, EMCY, the heartbeats of
+//! other nodes and stored parameters.
+
+use super::pdos::low_half;
+use super::state::{Pending, SELF_START, Scope};
+use super::{Action, Application, Definition, STALE, store};
+use crate::array::Array;
+use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
+use crate::emcy::Fault;
+use crate::lss::Identity;
+use crate::nmt::State;
+use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
+use crate::transmit::Context;
+use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync, time_stamp};
+
+/// Identity object.
+const IDENTITY: u16 = 0x1018;
+
+/// A device without its SDO server and its LSS slave, which act on it.
+pub(super) struct Inner<D: Definition> {
+    pub(super) dictionary: &'static Dictionary,
+    /// `None` for a device that waits for a node-ID from LSS.
+    pub(super) node_id: Option<NodeId>,
+    pub(super) state: State,
+    /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
+    pub(super) process_due: Instant,
+    pub(super) services_due: Instant,
+    pub(super) heartbeat: heartbeat::Producer,
+    pub(super) guarding: heartbeat::Guarding,
+    pub(super) pending: Pending,
+    pub(super) application: D::Application,
+    pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
+    pub(super) sync: sync::Consumer,
+    pub(super) sync_producer: sync::Producer,
+    pub(super) time_stamp: time_stamp::Service,
+    pub(super) emcy: emcy::Producer,
+    pub(super) tpdos: D::Tpdos,
+    pub(super) rpdos: D::Rpdos,
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
+    /// in the set and need no further check.
+    pub(super) rpdo_filter: u32,
+    pub(super) scanner: Scanner<D::Scanned>,
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
+    pub(super) all_nodes: Option<(CanId, u16)>,
+    /// Whether any TPDO sends events.
+    pub(super) sends_events: bool,
+    /// The first PDOs of the chains.
+    pub(super) first_tpdos: Links,
+    pub(super) first_rpdos: Links,
+    pub(super) jobs: store::Jobs,
+    /// The groups whose stored values could not be loaded: the defaults are in use.
+    pub(super) lost: Groups,
+    /// The groups whose newest stored values could not be loaded: the values of the save before are in use.
+    pub(super) older: Groups,
+    pub(super) is_bus_off: bool,
+    pub(super) image: D::Image,
+}
+
+impl<D: Definition> Inner<D> {
+    /// Free places in the transmit queue that a block upload leaves: for a heartbeat and an LSS response, and beside
+    /// process data for all PDOs of a SYNC, a heartbeat and an EMCY.
+    pub(super) const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
+
+    /// A device that has not started.
+    pub(super) fn new(
+        dictionary: &'static Dictionary,
+        node_id: Option<NodeId>,
+        application: D::Application,
+    ) -> Inner<D> {
+        let emcy = emcy::Producer::new(D::Application::CONDITIONS, application.register_bits());
+        Inner {
+            dictionary,
+            node_id,
+            state: State::Initialising,
+            process_due: Instant::NEVER,
+            services_due: Instant::NEVER,
+            heartbeat: heartbeat::Producer::new(),
+            guarding: heartbeat::Guarding::new(),
+            pending: Pending::new(),
+            application,
+            watches: heartbeat::Consumer::new(),
+            sync: sync::Consumer::new(),
+            sync_producer: sync::Producer::new(),
+            time_stamp: time_stamp::Service::new(),
+            emcy,
+            tpdos: D::Tpdos::filled(Tpdo::new),
+            rpdos: D::Rpdos::filled(Rpdo::new),
+            rpdo_filter: 0,
+            scanner: Scanner::new(),
+            all_nodes: None,
+            sends_events: false,
+            first_tpdos: Links::END,
+            first_rpdos: Links::END,
+            jobs: store::Jobs::new(),
+            lost: Groups::NONE,
+            older: Groups::NONE,
+            is_bus_off: false,
+            image: D::Image::filled(|| 0),
+        }
+    }
+
+    /// Whether the device has a service. The compiler removes the code of any other.
+    pub(super) const fn has(service: Services) -> bool {
+        D::SERVICES.contains(service)
+    }
+
+    /// Whether the device has process data, or sends or receives SYNCs or time stamps.
+    pub(super) const fn has_process() -> bool {
+        let pdos = Self::has(Services::TPDO) || Self::has(Services::RPDO);
+        pdos || Self::has(Services::SYNC_PRODUCER) || Self::has(Services::TIME)
+    }
+
+    pub(super) fn is_initialising(&self) -> bool {
+        self.state == State::Initialising
+    }
+
+    /// The CAN-ID of a service of this device. Without a node-ID, the CAN-ID for node-ID 0, which no device uses.
+    pub(super) fn service(&self, function: u16) -> CanId {
+        CanId::of_service(function, self.node_id.map_or(0, NodeId::get))
+    }
+
+    /// Makes the services due at this instant, or earlier.
+    pub(super) fn serve_until(&mut self, due: Instant) {
+        self.services_due = self.services_due.min(due);
+    }
+
+    /// Asks the caller for an action.
+    pub(super) fn ask(&mut self, action: Action) {
+        self.pending.ask(action);
+    }
+
+    /// An integer of at most 32 bits; 0 where the dictionary has no such entry.
+    #[inline(never)]
+    pub(super) fn number(&self, index: u16, sub: u8) -> u32 {
+        self.number_or(index, sub, 0)
+    }
+
+    pub(super) fn number_or(&self, index: u16, sub: u8, absent: u32) -> u32 {
+        self.dictionary.find(index, sub).map_or(absent, |entry| self.word(entry.field))
+    }
+
+    /// The default value of an integer of at most 32 bits, including the node-ID where the default is relative to it.
+    pub(super) fn default_number(&self, entry: &Entry) -> u32 {
+        self.dictionary.default_number(entry, self.node_id)
+    }
+
+    pub(super) fn word(&self, field: Field) -> u32 {
+        little_endian(field.get(self.image.as_ref()))
+    }
+
+    pub(super) fn identity(&self) -> Identity {
+        Identity {
+            vendor: self.number(IDENTITY, 1),
+            product: self.number(IDENTITY, 2),
+            revision: self.number(IDENTITY, 3),
+            serial: self.number(IDENTITY, 4),
+        }
+    }
+
+    /// Changes the NMT state.
+    pub(super) fn enter(&mut self, state: State) {
+        if state == self.state {
+            return;
+        }
+        let had_services = self.state.has_services();
+        (self.state, self.services_due) = (state, STALE);
+        if Self::has(Services::SYNC_PRODUCER) && had_services != state.has_services() {
+            self.restart_sync();
+        }
+        if Self::has_process() {
+            self.start_or_stop_pdos(state);
+        }
+        self.application.state(state, self.image.as_mut());
+    }
+
+    /// The NMT state has changed to `state`.
+    fn start_or_stop_pdos(&mut self, state: State) {
+        self.sync.stop();
+        for place in 0..self.tpdos.as_ref().len() {
+            if let Some(tpdo) = self.tpdos.as_mut().get_mut(place) {
+                if state == State::Initialising {
+                    tpdo.forget_sent();
+                }
+                if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
+            }
+            self.begin_events(place);
+        }
+        self.rpdos.as_mut().iter_mut().for_each(Rpdo::stop);
+        if Self::has(Services::MULTIPLEXED_TPDO) {
+            if state == State::Initialising {
+                self.scanner.forget_sent();
+            }
+            if state.has_pdos() { self.scanner.start() } else { self.scanner.stop() }
+        }
+        self.process_due = STALE;
+    }
+
+    /// Sets objects to their values after a reset: all objects, or the communication objects only.
+    pub(super) fn load_values(&mut self, everything: bool) {
+        if !Self::has(Services::FAULTS) {
+            return self.dictionary.load_defaults(self.image.as_mut());
+        }
+        self.load_defaults(if everything { Scope::Everything } else { Scope::Communication });
+        self.load_stored(Group::Communication);
+        if everything {
+            self.load_stored(Group::Application);
+            self.load_stored(Group::Calibration);
+        }
+    }
+
+    /// Hands all protocols their parameters from the dictionary.
+    pub(super) fn configure(&mut self, now: Instant) {
+        if Self::has(Services::SYNC) {
+            self.configure_sync(now);
+        }
+        if Self::has(Services::TIME) {
+            self.configure_time();
+        }
+        if Self::has(Services::EMCY) {
+            let _ = self.emcy.configure(self.number_or(0x1014, 0, emcy::OFF));
+            self.emcy.set_inhibit(low_half(self.number(0x1015, 0)), now);
+        }
+        if Self::has(Services::HEARTBEAT_CONSUMER) {
+            self.configure_watches(now);
+        }
+        if Self::has(Services::GUARDING) {
+            self.configure_guarding(now);
+            self.guarding.restart();
+        }
+        if Self::has_process() {
+            self.configure_pdos(now);
+        }
+        if Self::has(Services::FAULTS) {
+            self.configure_faults(now);
+        }
+        if Self::has(Services::SELF_START) && self.number(0x1F80, 0) == SELF_START {
+            self.pending.next_state = Some(State::Operational);
+        }
+    }
+
+    /// Sends the process data that is due.
+    #[inline]
+    pub(super) fn send_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+        if context.now >= self.process_due {
+            self.run_process(context);
+        }
+    }
+
+    /// Checks for due work other than SDO, LSS and the heartbeat of the device.
+    #[inline(never)]
+    pub(super) fn poll_errors(&mut self, context: &mut Context<'_, impl Transmit>) {
+        while Self::has(Services::HEARTBEAT_CONSUMER)
+            && let Some(change) = self.watches.expire(context.now)
+        {
+            self.on_watch(change, context.now);
+        }
+        if Self::has(Services::GUARDING) && self.guarding.expire(context.now) {
+            self.raise(Fault::LifeGuard, context.now);
+        }
+        if Self::has(Services::EMCY) && self.state.has_services() {
+            self.emcy.poll(D::Application::LISTS_DETAIL, context);
+        }
+        if Self::has(Services::FAULTS) {
+            self.react();
+        }
+    }
+
+    /// The next deadline of `poll_errors`.
+    pub(super) fn errors_due(&self) -> Instant {
+        let is_sent = Self::has(Services::EMCY) && self.state.has_services();
+        let emcy = if is_sent { self.emcy.due() } else { Instant::NEVER };
+        let due = if Self::has(Services::GUARDING) { emcy.min(self.guarding.due()) } else { emcy };
+        if Self::has(Services::HEARTBEAT_CONSUMER) { due.min(self.watches.due()) } else { due }
+    }
+}

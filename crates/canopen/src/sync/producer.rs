@@ -1,0 +1,71 @@
+//! SYNC producer (CiA 301, 7.2.5): sends a SYNC every communication cycle period.
+
+use super::Settings;
+use crate::{CanId, CobId, Duration, Frame, Instant};
+
+/// Sends SYNCs while bit 30 of 1005h is set and 1006h is not 0.
+#[derive(Debug)]
+pub(crate) struct Producer {
+    id: CanId,
+    /// Communication cycle period in us; 0 while no SYNC is produced.
+    period: u32,
+    /// The highest counter value; 0 for no counter.
+    overflow: u8,
+    counter: u8,
+    due: Instant,
+}
+
+impl Producer {
+    pub(crate) const fn new() -> Producer {
+        Producer { id: CanId::of_service(0x080, 0), period: 0, overflow: 0, counter: 0, due: Instant::NEVER }
+    }
+
+    /// Takes new settings. `restart` or `stop` follows.
+    pub(crate) fn configure(&mut self, settings: &Settings) {
+        let Settings { cob_id, period, overflow, .. } = *settings;
+        let id = CobId::parse(cob_id).filter(|cob_id| cob_id.bit30).map(|cob_id| cob_id.id);
+        (self.period, self.overflow) = (if id.is_some() { period } else { 0 }, overflow);
+        self.id = id.unwrap_or(self.id);
+    }
+
+    /// The next SYNC is due at once, with the counter 1.
+    pub(crate) fn restart(&mut self) {
+        self.counter = 0;
+        self.due = if self.period == 0 { Instant::NEVER } else { Instant(0) };
+    }
+
+    /// No SYNC is produced in this NMT state.
+    pub(crate) fn stop(&mut self) {
+        self.due = Instant::NEVER;
+    }
+
+    /// When the next SYNC is due.
+    pub(crate) fn due(&self) -> Instant {
+        self.due
+    }
+
+    /// The next SYNC.
+    pub(crate) fn frame(&self) -> Frame {
+        match self.overflow {
+            0 => Frame::data_frame(self.id, 0, [0; 8]),
+            _ => Frame::data_frame(self.id, 1, [self.next_counter(), 0, 0, 0, 0, 0, 0, 0]),
+        }
+    }
+
+    fn next_counter(&self) -> u8 {
+        if self.counter < self.overflow { self.counter + 1 } else { 1 }
+    }
+
+    /// The SYNC has been sent. The next one is due a period after this one was, so delays do not add up.
+    pub(crate) fn sent(&mut self, now: Instant) {
+        self.counter = self.next_counter();
+        let (period, first) = (Duration(self.period.into()), self.due == Instant(0));
+        let next = if first { now } else { self.due }.plus(period);
+        self.due = if next > now { next } else { now.plus(period) };
+    }
+
+    /// The SYNC cannot be sent before this instant.
+    pub(crate) fn wait_until(&mut self, due: Instant) {
+        self.due = due;
+    }
+}
