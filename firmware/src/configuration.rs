@@ -12,7 +12,7 @@ use node::{
 };
 use profiles::board::{ChipThermometer, POSITION_RECORD_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, View};
-use update::{Authorisation, Trial};
+use update::{Authorisation, Programs, Trial};
 
 use crate::bit_rate::Rate;
 
@@ -67,7 +67,9 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
     let position_record = StoredPositionRecord::read(&mut view);
     let mut memory = prepare(view);
     if let Some(memory) = &mut memory {
-        protocol.set_trial(Trial::read(&mut memory.store().flash().trial(), &LAYOUT));
+        let records = &mut memory.store().flash().trial();
+        protocol.set_trial(Trial::read(records, &LAYOUT));
+        protocol.set_programs(Programs::read(records, &LAYOUT));
     }
     protocol.show_memory(memory.as_ref().map_or(MemoryState::BROKEN, ParameterMemory::state));
     Loaded { protocol, parameters, setup, rate, boot_data: fault, memory, position_record }

@@ -96,8 +96,10 @@ pub(crate) fn build_for_owner() -> Result<()> {
         "the bootloader needs the key of its owner in UPDATE_PUBLIC_KEY; `cargo xtask sign key FILE` makes one. \
          For a board on a desk: cargo xtask images --development"
     );
-    let packages = ["--release", "-p", "firmware", "-p", "bootloader"];
-    progress::build("images", &mut Toolchain::ensure()?.cargo("build", &packages))?;
+    // Apart, as in the tests: together, cargo gives the bootloader the features that the firmware needs.
+    let toolchain = Toolchain::ensure()?;
+    progress::build("bootloader", &mut toolchain.cargo("build", &["--release", "-p", "bootloader"]))?;
+    compile_application(&toolchain)?;
     println!("{} is to be signed: cargo xtask sign image", dir().join("firmware").display());
     Ok(())
 }

@@ -12,12 +12,16 @@ mod fuzz;
 mod hal_examples;
 mod images;
 mod matrix;
+mod metadata;
 mod mutants;
 mod own_tool;
+mod packages;
 mod pictures;
 mod plots;
 mod progress;
 mod regressions;
+mod reproducible;
+mod sbom;
 mod setup;
 mod sim;
 mod target;
@@ -31,6 +35,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use own_tool::Tools;
+use target::Toolchain;
 
 /// Everything that needs more than `cargo test`.
 #[derive(Parser)]
@@ -114,6 +119,10 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
+    /// Write the software bill of materials of each product (CycloneDX): packages, checksums, licences, compiler
+    Sbom(sbom::Flags),
+    /// Build the images in two folders, and compare what is flashed
+    Reproducible,
     /// Install what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
@@ -163,6 +172,8 @@ fn run(command: Command) -> Result<()> {
         Command::Timing => timing::print(),
         Command::Panics => callgraph::panics(Tools::ByCargo),
         Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo),
+        Command::Reproducible => reproducible::check(&Toolchain::ensure()?),
+        Command::Sbom(flags) => sbom::write(&flags),
         Command::Setup { dry_run } => setup::run(dry_run),
         Command::Test(flags) => test::run(&flags),
         Command::ProbeLibclang => setup::probe(),

@@ -1,10 +1,12 @@
 //! Tests that the products under MIT or Apache-2.0 have no dependency under a stricter licence, except those that the
 //! README names.
 
-use std::collections::{BTreeSet, HashMap};
-use std::process::Command;
+#[path = "../src/metadata.rs"]
+mod metadata;
 
-use serde::Deserialize;
+use std::collections::BTreeSet;
+
+use metadata::Metadata;
 
 const CORTEX_M4: &str = "thumbv7em-none-eabihf";
 const HOST: &str = env!("XTASK_HOST");
@@ -32,72 +34,6 @@ const PERMISSIVE: [&str; 13] = [
     "WTFPL",
     "Zlib",
 ];
-
-#[derive(Deserialize)]
-struct Metadata {
-    packages: Vec<Package>,
-    resolve: Resolve,
-}
-
-#[derive(Deserialize)]
-struct Package {
-    id: String,
-    name: String,
-    license: Option<String>,
-}
-
-#[derive(Deserialize)]
-struct Resolve {
-    nodes: Vec<Node>,
-}
-
-#[derive(Deserialize)]
-struct Node {
-    id: String,
-    deps: Vec<Dependency>,
-}
-
-#[derive(Deserialize)]
-struct Dependency {
-    pkg: String,
-    dep_kinds: Vec<Kind>,
-}
-
-#[derive(Deserialize)]
-struct Kind {
-    /// `None` for a dependency that is linked, else `build` or `dev`.
-    kind: Option<String>,
-}
-
-impl Metadata {
-    fn of(platform: &str) -> Metadata {
-        let arguments = ["metadata", "--format-version", "1", "--locked", "--filter-platform", platform];
-        let output = Command::new(env!("CARGO")).args(arguments).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// The packages that are linked into a package of the workspace, including that package.
-    fn linked(&self, root: &str) -> Vec<&Package> {
-        let packages: HashMap<&str, &Package> =
-            self.packages.iter().map(|own| (own.id.as_str(), own)).collect();
-        let nodes: HashMap<&str, &Node> =
-            self.resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
-        let first =
-            self.packages.iter().find(|package| package.name == root).expect("a package of the workspace");
-        let (mut found, mut left) = (BTreeSet::from([first.id.as_str()]), vec![first.id.as_str()]);
-        while let Some(id) = left.pop() {
-            let is_linked =
-                |dependency: &&Dependency| dependency.dep_kinds.iter().any(|kind| kind.kind.is_none());
-            for dependency in nodes[id].deps.iter().filter(is_linked) {
-                if found.insert(&dependency.pkg) {
-                    left.push(&dependency.pkg);
-                }
-            }
-        }
-        found.into_iter().map(|id| packages[id]).collect()
-    }
-}
 
 /// Whether an SPDX expression allows the choice of a permissive licence. A slash is an old form of OR.
 fn is_permissive(expression: &str) -> bool {
@@ -160,8 +96,8 @@ fn what_is_shipped_asks_for_no_more_than_the_readme_says() {
     let stated = readme.split_once("## Licences").expect("a section about licences").1;
     let mut seen = BTreeSet::new();
     for (root, platform) in SHIPPED {
-        let metadata = Metadata::of(platform);
-        let linked = metadata.linked(root);
+        let metadata = Metadata::of(platform).unwrap();
+        let linked = metadata.linked(root).expect("a package of the workspace");
         assert!(!linked.is_empty());
         for package in linked {
             let licence = package.license.as_deref().unwrap_or("none");
@@ -178,9 +114,10 @@ fn what_is_shipped_asks_for_no_more_than_the_readme_says() {
 
 #[test]
 fn the_emulator_would_be_found_out() {
-    let metadata = Metadata::of(HOST);
+    let metadata = Metadata::of(HOST).unwrap();
     let asks: Vec<_> = metadata
         .linked("sim")
+        .expect("a package of the workspace")
         .into_iter()
         .filter(|package| !is_permissive(package.license.as_deref().unwrap_or("none")))
         .map(|package| package.name.as_str())

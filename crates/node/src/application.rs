@@ -11,7 +11,7 @@ use profiles::communication::{
 use profiles::fault::Flags;
 use profiles::lift::objects::{SWITCHED_OFF, UNKNOWN_CHOICES};
 use profiles::{AnyProfile, Snapshot};
-use update::Authorisation;
+use update::{Authorisation, Programs};
 
 use crate::Setup;
 use crate::configured::Configured;
@@ -40,6 +40,8 @@ pub(crate) struct NodeApplication {
     /// Counters of lost events, as counted by the firmware (2001h).
     pub(crate) lost_events: [u32; LOST_EVENTS],
     pub(crate) trial: ProgramTrial,
+    /// The programs in the flash (2004h).
+    pub(crate) programs: Programs,
     /// Permission to change the program (2003h).
     pub(crate) authorisation: Authorisation,
     buffer: TransferBuffer,
@@ -57,6 +59,7 @@ impl NodeApplication {
             memory: MemoryState::UNKNOWN,
             lost_events: [0; LOST_EVENTS],
             trial: ProgramTrial::default(),
+            programs: Programs::default(),
             authorisation: Authorisation::default(),
             buffer: TransferBuffer::EMPTY,
         }
@@ -128,6 +131,7 @@ impl Application for NodeApplication {
         self.show_lost_events(image);
         self.show_memory(image);
         self.show_trial(image);
+        self.show_programs(image);
         self.show_authorisation(image);
         self.show_values(image);
     }

@@ -3,8 +3,8 @@
 use canopen::sdo::Abort;
 use canopen::{CanId, Duration, Frame, Instant};
 use profiles::Snapshot;
-use profiles::communication::PROGRAM_TRIAL;
-use update::{Reason, Refusal, Status, Trial};
+use profiles::communication::{PROGRAM_STATE, PROGRAM_TRIAL};
+use update::{Programs, Reason, Refusal, Status, Trial};
 
 use crate::Protocol;
 use crate::application::NodeApplication;
@@ -84,6 +84,11 @@ impl Protocol {
     /// Takes the state of this program's trial. To be called before the start.
     pub fn set_trial(&mut self, trial: Trial) {
         self.device.application_mut().trial.state = trial;
+    }
+
+    /// Takes the programs in the flash. To be called before the start.
+    pub fn set_programs(&mut self, programs: Programs) {
+        self.device.application_mut().programs = programs;
     }
 
     /// Whether the program is still on trial. Until then stored data must stay as the previous program has stored it,
@@ -166,6 +171,14 @@ impl Protocol {
 impl NodeApplication {
     pub(crate) fn show_trial(&self, image: &mut [u8]) {
         self.show(PROGRAM_TRIAL, 1, &[self.trial.state()], image);
+    }
+
+    pub(crate) fn show_programs(&self, image: &mut [u8]) {
+        let Programs { counter, revoked_keys, staged, kept } = self.programs;
+        self.show(PROGRAM_STATE, 3, &[revoked_keys], image);
+        for (sub, word) in [(2, counter), (4, staged), (5, kept)] {
+            self.show(PROGRAM_STATE, sub, &word.to_le_bytes(), image);
+        }
     }
 
     /// Whether values have been measured.

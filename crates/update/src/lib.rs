@@ -64,6 +64,7 @@ mod image;
 pub mod key;
 #[cfg(feature = "mock")]
 pub mod mock;
+mod programs;
 mod record;
 mod refusal;
 mod seal;
@@ -80,6 +81,7 @@ pub use boot::{Decision, Proof, Start, Stay, application, boot, boot_sealed};
 pub use crashes::{Crashes, Reset};
 pub use flash::Flash;
 pub use header::{Description, HEADER_LEN, Header, SIGNATURE_LEN, SIGNED_LEN, Version};
+pub use programs::Programs;
 pub use refusal::Refusal;
 pub use signature::CONTEXT;
 pub use status::Status;

@@ -52,7 +52,13 @@ impl Security {
         if about.counter == 0 { Ok(()) } else { self.set(flash, mark_of(about.counter)) }
     }
 
-    fn least_counter<F: Flash>(self, flash: &mut F) -> Result<u32, Refusal> {
+    /// The revoked keys, bit n for key n. A key that cannot be read is not among them.
+    pub(crate) fn revoked<F: Flash>(self, flash: &mut F) -> u8 {
+        let is_revoked = |key: &u32| self.is_set(flash, *key).unwrap_or(false);
+        (0..MOST_KEYS).filter(is_revoked).fold(0, |keys, key| keys | 1_u8.wrapping_shl(key))
+    }
+
+    pub(crate) fn least_counter<F: Flash>(self, flash: &mut F) -> Result<u32, Refusal> {
         let mut counter = self.highest_counter();
         while counter > 0 && !self.is_set(flash, mark_of(counter))? {
             counter = counter.saturating_sub(1);

@@ -138,6 +138,10 @@ impl<F: Flash> Updater<F> {
     /// [`Refusal::Unspecified`] while the machine is busy; [`Refusal::Write`].
     pub fn clear(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
+        // Nothing was programmed since: a command that is repeated wears nothing out.
+        if matches!(self.state, State::Cleared) {
+            return self.settle(Ok(()));
+        }
         let (flash, layout) = (&mut self.flash, &self.target.layout);
         if Trial::read(flash, layout).is_undecided() {
             return self.refuse(Refusal::OnTrial);

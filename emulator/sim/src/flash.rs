@@ -49,7 +49,7 @@ pub(crate) fn save_backup(dir: &Path, node: u8, bytes: Option<&[u8]>) -> Result<
 }
 
 fn read(path: &Path, size: usize) -> Result<Option<Vec<u8>>> {
-    let bytes = match fs::read(path) {
+    let bytes = match input::read(path, size as u64) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
     };
@@ -61,7 +61,12 @@ fn write(dir: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
     let temporary = path.with_extension("new");
     let write = || {
         fs::create_dir_all(dir)?;
-        let mut file = fs::File::create(&temporary)?;
+        // Whatever has the name of the temporary file, a named pipe or a link among others, is not written to.
+        match fs::remove_file(&temporary) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let mut file = fs::File::create_new(&temporary)?;
         file.write_all(bytes)?;
         file.sync_all()?;
         fs::rename(&temporary, path)
@@ -104,6 +109,35 @@ mod tests {
         assert_eq!(load(&dir, 5, CHIP).unwrap(), None, "it is not the flash");
         save_backup(&dir, 5, None).unwrap();
         assert_eq!(load_backup(&dir, 5).unwrap(), None);
+        fs::remove_dir_all(dir).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_named_pipe_or_a_device_is_an_error_of_one_line_and_is_not_written_to() {
+        let dir = dir("kinds");
+        fs::create_dir_all(&dir).unwrap();
+        let pipe = |path: PathBuf| {
+            assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+        };
+        pipe(file(&dir, 1));
+        std::os::unix::fs::symlink("/dev/zero", file(&dir, 2)).unwrap();
+        let huge = fs::File::create(file(&dir, 3)).unwrap();
+        huge.set_len(8 << 30).unwrap();
+        for (node, words) in
+            [(1, "not a regular file"), (2, "not a regular file"), (3, "larger than 524288 bytes")]
+        {
+            let error = format!("{:#}", load(&dir, node, CHIP).unwrap_err());
+            let named = error.contains(&format!("node-{node}.flash")) && error.contains(words);
+            assert!(named && !error.contains('\n'), "{error}");
+        }
+        pipe(dir.join("node-4.new"));
+        std::os::unix::fs::symlink(dir.join("elsewhere"), dir.join("node-5.new")).unwrap();
+        for node in [4, 5] {
+            save(&dir, node, &vec![1; SIZE]).unwrap();
+            assert_eq!(load(&dir, node, CHIP).unwrap(), Some(vec![1; SIZE]));
+        }
+        assert!(!dir.join("elsewhere").exists());
         fs::remove_dir_all(dir).unwrap();
     }
 

@@ -5,6 +5,9 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use defmt_decoder::Table;
 
+/// The greatest size of an ELF file in bytes, with its debug information.
+const LARGEST: u64 = 256 << 20;
+
 /// The firmware or the bootloader.
 pub struct Image {
     /// The path of the file, for messages.
@@ -24,7 +27,7 @@ impl Image {
     /// When the file cannot be read, or is no ELF file.
     pub fn load(path: &Path) -> Result<Image> {
         let name = path.display().to_string();
-        let elf = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
+        let elf = input::read(path, LARGEST).with_context(|| format!("cannot read {name}"))?;
         Image::parse(&name, elf).with_context(|| format!("{name} is not an image for the board"))
     }
 

@@ -88,6 +88,17 @@ fn who_watches_is_told_of_the_changes_of_others() {
     assert!(after - before < 1.0, "a change is told at once: {before} {after}");
 }
 
+/// A connection must neither read the files of this machine nor hold up the simulation with a named pipe or a device.
+#[test]
+fn a_connection_names_no_file() {
+    let mut bench = Bench::new();
+    let mut client = bench.connect();
+    for line in ["pressure csv:/etc/passwd", "shaft 1=csv:/dev/zero", "thermistor  csv:Cargo.toml"] {
+        let answer = bench.ask(&mut client, line).unwrap();
+        assert_eq!(answer["error"], "csv: is for the command line of the simulator", "{line}");
+    }
+}
+
 /// Any web page can make a browser send a request to this port, with commands in its body.
 #[test]
 fn a_browser_gives_no_commands() {

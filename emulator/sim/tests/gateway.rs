@@ -126,6 +126,37 @@ fn a_client_that_leaves_gives_its_place_to_the_next() {
     }
 }
 
+/// Any web page can make a browser send a request to a port of this machine, with text of its choice in the body (a "no-cors"
+/// POST). Neither port takes a frame from it, and the connection is closed.
+#[test]
+fn a_browser_sends_no_frames() {
+    let mut bench = Bench::new();
+    let [socketcand, slcan] = [Protocol::Socketcand, Protocol::Slcan].map(|protocol| bench.serve(protocol));
+    let page = bench.serve(Protocol::Page);
+    let mut other = bench.raw_client(socketcand);
+    let commands = "< open vcan0 >< rawmode >< send 000 2 2 0 >\r\rC\rS8\rO\rt00020200\r";
+    for address in [socketcand, page, slcan] {
+        for request in [
+            format!("POST / HTTP/1.1\r\nHost: {address}\r\nContent-Type: text/plain\r\n\r\n{commands}"),
+            format!("GET /%3C HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\n\r\n{commands}"),
+            format!("\u{16}\u{3}\u{1}\u{2}\0{commands}"),
+        ] {
+            let mut browser = bench.connect(address);
+            browser.write_all(request.as_bytes()).unwrap();
+            bench.run(50);
+            assert!(bench.world.take_frames().is_empty(), "{request}");
+            let end = std::iter::from_fn(|| Some(browser.read(&mut [0; 256])))
+                .find(|read| !matches!(read, Ok(1..)));
+            assert!(
+                !matches!(&end, Some(Err(error)) if error.kind() == ErrorKind::WouldBlock),
+                "still open: {request}"
+            );
+        }
+    }
+    assert_eq!(bench.gateway.clients(), 1);
+    assert_eq!(bench.ask(&mut other, "< echo >"), "< echo >");
+}
+
 /// Frames that a client has sent before it closed its connection reach the bus, over both protocols: six times `nmt
 /// start`.
 #[test]

@@ -4,7 +4,8 @@ use canopen::Frame;
 use host_tests::bench::Bench;
 use node::fault::PROGRAM_TAKEN_BACK;
 use node::{Instant, Verdict};
-use update::{Reason, Trial};
+use profiles::Personality;
+use update::{Programs, Reason, Trial};
 
 const STATE: u8 = 1;
 const COMMAND: u8 = 2;
@@ -54,6 +55,20 @@ fn left_alone(limit: u16, automatic: u16) -> Bench {
     bench.protocol.end_trial();
     bench.protocol.set_trial(Trial::Open);
     bench
+}
+
+#[test]
+fn the_programs_in_the_flash_are_read_by_an_object_of_every_personality() {
+    for personality in Personality::ALL {
+        let mut bench = Bench::booted_as(personality);
+        let programs = Programs { counter: 7, revoked_keys: 0x88, staged: 0x0102_0304, kept: 0x0506_0708 };
+        bench.protocol.set_programs(programs);
+        bench.restart();
+        let mut read = |sub| bench.read(0x2004, sub).unwrap();
+        assert_eq!((read(2), read(3)), (vec![7, 0, 0, 0], vec![0x88]), "{personality:?}");
+        assert_eq!((read(4), read(5)), (vec![4, 3, 2, 1], vec![8, 7, 6, 5]), "{personality:?}");
+        assert!(bench.write(0x2004, 2, &[0; 4]).is_err());
+    }
 }
 
 #[test]

@@ -111,7 +111,7 @@ impl<'n> Acquisition<'n> {
         catalogue: &Catalogue,
         objects: &[Multiplexer],
     ) -> Result<Acquisition<'n>, Interruption> {
-        let deadline = network.now() + setup.options.limit;
+        let deadline = network.own_time() + setup.options.limit;
         let mut client = Client::new(network, setup.node, setup.options).by(deadline);
         let (tpdos, signals) = survey(&mut client, catalogue, objects)?;
         network.forget();

@@ -43,4 +43,4 @@ pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
-pub use network::{Heard, Logged, Network};
+pub use network::{Gate, Heard, Logged, Network};

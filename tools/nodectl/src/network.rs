@@ -2,6 +2,7 @@
 //! again.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::io::ErrorKind;
 
 use canopen::client::heartbeat::Heartbeat;
 use canopen::client::{Service, Step, Taken};
@@ -49,6 +50,17 @@ pub struct Heard {
     pub state: Option<State>,
 }
 
+/// Whether a transfer may begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gate {
+    /// It may begin.
+    Open,
+    /// It may begin now, after it had to wait.
+    Waited,
+    /// Nobody wants the transfer any more.
+    Closed,
+}
+
 /// A bus that can be opened again after it is lost.
 pub struct Network {
     opener: Box<dyn FnMut() -> Result<Box<dyn Bus>, BusError>>,
@@ -59,6 +71,9 @@ pub struct Network {
     log: Option<Vec<Logged>>,
     others: OtherClients,
     heard: BTreeMap<NodeId, Heard>,
+    gate: Box<dyn FnMut() -> Gate>,
+    /// The time that was spent at the gate.
+    waited: Duration,
 }
 
 impl Network {
@@ -79,7 +94,41 @@ impl Network {
             log: None,
             others: OtherClients::default(),
             heard: BTreeMap::new(),
+            gate: Box::new(|| Gate::Open),
+            waited: Duration(0),
         })
+    }
+
+    /// Calls `gate` before each transfer. It may wait there for the transfers of somebody else.
+    pub fn set_gate(&mut self, gate: impl FnMut() -> Gate + 'static) {
+        self.gate = Box::new(gate);
+    }
+
+    /// Passes the gate. Frames that have come while the gate was closed belong to the transfers of somebody else.
+    ///
+    /// # Errors
+    /// The gate has been closed for good, or the bus is lost.
+    pub fn pass(&mut self) -> Result<(), BusError> {
+        let before = self.now();
+        match (self.gate)() {
+            Gate::Open => {}
+            Gate::Waited => {
+                for _ in 0..KEPT {
+                    if self.fetch(self.now())?.is_none() {
+                        break;
+                    }
+                }
+                self.waited.0 += self.now().0.saturating_sub(before.0);
+            }
+            Gate::Closed => return Err(BusError::Lost(ErrorKind::Interrupted.into())),
+        }
+        Ok(())
+    }
+
+    /// The time of this computer without the time that was spent at the gate, for deadlines of several transfers.
+    #[must_use]
+    pub fn own_time(&self) -> Instant {
+        Instant(self.now().0.saturating_sub(self.waited.0))
     }
 
     /// Opens the bus again. The kept frames of the old bus are dropped.

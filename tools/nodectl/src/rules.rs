@@ -1,6 +1,5 @@
 //! Data sheets for the monitor, which judges the traffic of a bus.
 
-use std::fs;
 use std::str::FromStr;
 
 use canopen::NodeId;
@@ -39,7 +38,7 @@ impl Device {
         if let Some(own) = own {
             return Ok(Sheet::of_node(own.rows));
         }
-        let bytes = fs::read(&self.name).map_err(|error| error.to_string())?;
+        let bytes = input::read(self.name.as_ref(), 4 << 20).map_err(|error| error.to_string())?;
         let sheet = Eds::from_bytes(&bytes).map_err(|error| error.to_string())?;
         Ok(of_data_sheet(&sheet, self.node))
     }

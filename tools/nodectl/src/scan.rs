@@ -30,6 +30,7 @@ pub struct Presence {
 pub fn scan(network: &mut Network, time: Duration) -> Result<BTreeMap<NodeId, Presence>, BusError> {
     let mut found = BTreeMap::new();
     for node in (1..=127).filter_map(NodeId::new) {
+        network.pass()?;
         let question = Request::Upload(at(0x1000, 0)).encode();
         if let Some(frame) = Frame::new(0x600 + u16::from(node.get()), &question) {
             network.send(&frame)?;

@@ -1,21 +1,30 @@
 //! The connected pages, and the messages that wait for each. The queues are bounded, so that a slow page needs limited
 //! memory.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
 
 /// Bytes that may wait for a page before events for it are dropped.
 const ROOM: usize = 512 * 1024;
-/// The number of pages that may be connected at the same time.
+/// The number of pages that may be connected at the same time, and how many of them without the token.
 const PAGES: usize = 32;
+const READERS: usize = 24;
 /// Bytes that may wait for a page at all. A page with more waiting answers is disconnected.
 const MOST: usize = 16 * 1024 * 1024;
 
 /// The number of a page while it is connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PageId(u64);
+
+impl PageId {
+    /// The page with this number, for tests.
+    #[must_use]
+    pub const fn new(number: u64) -> PageId {
+        PageId(number)
+    }
+}
 
 /// An action of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +60,8 @@ pub struct Hub {
 struct Pages {
     next: u64,
     outboxes: BTreeMap<PageId, Arc<Outbox>>,
+    /// The pages without the token.
+    readers: BTreeSet<PageId>,
 }
 
 /// The queue of one page.
@@ -97,19 +108,24 @@ impl Hub {
     }
 
     /// A place for a new page; `None` when there are too many.
-    pub(crate) fn enter(&self) -> Option<(PageId, Arc<Outbox>)> {
+    pub(crate) fn enter(&self, writes: bool) -> Option<(PageId, Arc<Outbox>)> {
         let mut pages = self.pages();
-        if pages.outboxes.len() == PAGES {
+        if pages.outboxes.len() == PAGES || (!writes && pages.readers.len() == READERS) {
             return None;
         }
         pages.next += 1;
         let (page, outbox) = (PageId(pages.next), Arc::new(Outbox::default()));
         pages.outboxes.insert(page, Arc::clone(&outbox));
+        if !writes {
+            pages.readers.insert(page);
+        }
         Some((page, outbox))
     }
 
     pub(crate) fn leave(&self, page: PageId) {
-        self.pages().outboxes.remove(&page);
+        let mut pages = self.pages();
+        pages.outboxes.remove(&page);
+        pages.readers.remove(&page);
     }
 
     fn outbox(&self, page: PageId) -> Option<Arc<Outbox>> {
@@ -169,7 +185,7 @@ mod tests {
     #[test]
     fn a_page_that_does_not_read_has_no_room_and_at_last_is_let_go() {
         let hub = Hub::default();
-        let (page, outbox) = hub.enter().unwrap();
+        let (page, outbox) = hub.enter(true).unwrap();
         assert!(hub.has_room(page));
         hub.send(page, "x".repeat(ROOM));
         assert!(!hub.has_room(page));
@@ -183,7 +199,7 @@ mod tests {
     #[test]
     fn pages_come_and_go_each_with_its_own_texts() {
         let hub = Hub::default();
-        let ((one, first), (two, second)) = (hub.enter().unwrap(), hub.enter().unwrap());
+        let ((one, first), (two, second)) = (hub.enter(true).unwrap(), hub.enter(false).unwrap());
         hub.send(one, "a".into());
         hub.send(two, "b".into());
         hub.leave(one);
@@ -197,9 +213,13 @@ mod tests {
     #[test]
     fn there_are_so_many_places_and_who_leaves_makes_room() {
         let hub = Hub::default();
-        let pages: Vec<PageId> = (0..PAGES).map(|_| hub.enter().unwrap().0).collect();
-        assert!(hub.enter().is_none());
+        let pages: Vec<PageId> = (0..READERS).map(|_| hub.enter(false).unwrap().0).collect();
+        assert!(hub.enter(false).is_none());
+        let with_token: Vec<PageId> = (READERS..PAGES).map(|_| hub.enter(true).unwrap().0).collect();
+        assert!(hub.enter(true).is_none());
         hub.leave(pages[0]);
-        assert!(hub.enter().is_some_and(|(page, _)| !pages.contains(&page)));
+        assert!(hub.enter(false).is_some_and(|(page, _)| !pages.contains(&page)));
+        hub.leave(with_token[0]);
+        assert!(hub.enter(false).is_none() && hub.enter(true).is_some());
     }
 }

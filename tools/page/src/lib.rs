@@ -11,6 +11,7 @@ mod files;
 mod hub;
 mod listen;
 mod pace;
+mod places;
 mod routes;
 mod socket;
 

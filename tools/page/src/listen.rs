@@ -6,22 +6,22 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use axum::Router;
+use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 
 use crate::access::{Access, Token};
 use crate::hub::{FromPage, Hub};
+use crate::places::{Place, Places};
 use crate::routes::{Site, router};
 
-/// The number of connections that may be open at the same time. A browser opens up to six for a page.
-const CONNECTIONS: usize = 128;
 /// The time-out for a request. A connection that sends nothing is closed then.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// The time after which a connection is closed that is no WebSocket by then, whether it reads the answers or not.
+const LONGEST: Duration = Duration::from_secs(30);
 /// The number of ports that are tried when the first one is in use.
 const PORTS: u16 = 20;
 
@@ -81,23 +81,25 @@ fn url(access: &Access, address: SocketAddr) -> String {
 
 async fn accept(socket: StdListener, router: Router) {
     let Ok(listener) = TcpListener::from_std(socket) else { return };
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
-    // The semaphore is never closed.
-    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
+    let places = Places::default();
+    for number in 0.. {
         match listener.accept().await {
-            Ok((stream, _)) => drop(tokio::spawn(connection(stream, router.clone(), place))),
+            Ok((stream, _)) => {
+                let task = tokio::spawn(connection(stream, router.clone(), places.of(number)));
+                places.enter(number, task.abort_handle());
+            }
             // The host has no resources for another connection at the moment.
             Err(_) => sleep(Duration::from_millis(100)).await,
         }
     }
 }
 
-async fn connection(stream: TcpStream, router: Router, _place: OwnedSemaphorePermit) {
+async fn connection(stream: TcpStream, router: Router, place: Place) {
     // An event is one small write that must be sent at once.
     let _ = stream.set_nodelay(true);
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(64 * 1024);
-    let service = TowerToHyperService::new(router);
+    let service = TowerToHyperService::new(router.layer(Extension(Arc::new(place))));
     // A failed connection concerns only its own client.
-    let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+    let _ = timeout(LONGEST, http.serve_connection(TokioIo::new(stream), service).with_upgrades()).await;
 }

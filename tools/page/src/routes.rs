@@ -6,8 +6,8 @@ use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, ORIGIN, REFERRER_POLICY, SET_COOKIE,
-    X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, ORIGIN, REFERRER_POLICY,
+    SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::{self, Next};
@@ -17,6 +17,7 @@ use axum::routing::get;
 use crate::access::{Access, Claim, Refusal, Rights};
 use crate::files;
 use crate::hub::Hub;
+use crate::places::Place;
 use crate::socket::{self, LARGEST, Listener};
 
 /// The content security policy: the page loads nothing from other servers, and has no inline scripts.
@@ -44,10 +45,15 @@ pub(crate) fn router(site: Site) -> Router {
 async fn checked(State(site): State<Site>, mut request: Request, next: Next) -> Response {
     match rights(&site.access, request.headers(), request.uri()) {
         Ok(rights) => {
+            if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| rights == Rights::Write)
+            {
+                place.trust();
+            }
             request.extensions_mut().insert(rights);
             next.run(request).await
         }
-        Err(refusal) => (StatusCode::FORBIDDEN, refusal.text()).into_response(),
+        // The connection is closed, so that refusals take no place.
+        Err(refusal) => (StatusCode::FORBIDDEN, [(CONNECTION, "close")], refusal.text()).into_response(),
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) type Listener = dyn Fn(FromPage) + Send + Sync;
 
 /// Serves a page until it disconnects or is disconnected.
 pub(crate) async fn serve(mut socket: WebSocket, writes: bool, hub: Arc<Hub>, listener: Arc<Listener>) {
-    let code = match hub.enter() {
+    let code = match hub.enter(writes) {
         Some((page, outbox)) => {
             listener(FromPage::Came { page, writes });
             let code = converse(&mut socket, page, &outbox, &*listener).await;

@@ -18,7 +18,7 @@ pub(crate) fn clients() -> Result<PathBuf> {
 
 /// The interpreter of an environment with the packages of a list. The environment is made anew when the list has
 /// changed.
-pub(super) fn ensure(environment: &Path, list: &str) -> Result<PathBuf> {
+pub(crate) fn ensure(environment: &Path, list: &str) -> Result<PathBuf> {
     let python = environment.join("bin/python");
     let stamp = environment.join("requirements.txt");
     let list = root().join(list);

@@ -8,7 +8,7 @@ use crate::command::{cargo, root, run};
 use crate::own_tool::Tools;
 use crate::setup::{self, Need, python};
 use crate::target::Toolchain;
-use crate::{bench, callgraph, hal_examples, images, progress};
+use crate::{bench, callgraph, hal_examples, images, packages, progress, reproducible};
 
 /// The builds for this machine that the tests need.
 pub(super) fn builds_for_host() -> Vec<Step> {
@@ -27,6 +27,7 @@ pub(super) fn builds_for_target(needs: &'static [Need], thorough: bool) -> Vec<S
         steps.push(Step::new("install qemu", || setup::install(&[Need::Qemu])));
         // Before the images of the default chip, because cargo puts both into the same place.
         steps.push(Step::new("build other_chips", build_other_chips));
+        steps.push(Step::new("reproducible images", || reproducible::check(&Toolchain::ensure()?)));
         steps.push(Step::new("build hal_examples", || hal_examples::build(&Toolchain::ensure()?)));
     }
     steps.extend([
@@ -43,6 +44,7 @@ pub(super) fn checks_for_host() -> Vec<Step> {
     vec![
         Step::new("lint host", lint_host),
         Step::new("documentation", document_host),
+        Step::new("packages", packages::check),
         Step::new("examples of the documentation", || run(host::cargo("test")?.args(["--quiet", "--doc"]))),
     ]
 }

@@ -60,10 +60,19 @@ pub const PROGRAM_AUTHORISATION_ROWS: &[Object] = &[
 /// Index of the object about the programs of the node.
 pub const PROGRAM_STATE: u16 = 0x2004;
 
-/// 2004h: facts about the board and its programs, for the master of an update.
+const fn fact(sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(PROGRAM_STATE, sub, name, kind, Access::ReadOnly)
+}
+
+/// 2004h: facts about the board and its programs, for the master of an update. Programs are named by their identification,
+/// as in 1F56h; 0 is none.
 pub const PROGRAM_STATE_ROWS: &[Object] = &[
-    Object::highest(PROGRAM_STATE, 1, "Program state"),
-    Object::new(PROGRAM_STATE, 1, "Board", Type::Unsigned32, Access::ReadOnly).value(product::BOARD as i64),
+    Object::highest(PROGRAM_STATE, 5, "Program state"),
+    fact(1, "Board", Type::Unsigned32).value(product::BOARD as i64),
+    fact(2, "Security counter", Type::Unsigned32),
+    fact(3, "Revoked keys", Type::Unsigned8),
+    fact(4, "Downloaded program", Type::Unsigned32),
+    fact(5, "Kept program", Type::Unsigned32),
 ];
 
 /// Index of the object that counts lost events.

@@ -11,6 +11,27 @@ use update::{
     Updater, application, boot,
 };
 
+/// A master that clears in a loop wears nothing out: the second command finds staging erased and proven.
+#[test]
+fn a_repeated_clear_erases_nothing() {
+    let mut flash = flash_with(&image_a(), 1);
+    let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
+    updater.clear().unwrap();
+    run(&mut updater).unwrap();
+    let erased = updater.flash().operations();
+    for _ in 0..1000 {
+        assert_eq!(updater.begin(Some(u32::MAX)), Err(Refusal::TooLong));
+        updater.clear().unwrap();
+        assert_eq!((run(&mut updater), updater.status()), (Ok(()), Status::GOOD));
+    }
+    assert_eq!(updater.flash().operations(), erased);
+    updater.begin(None).unwrap();
+    updater.receive(&image_b().bytes()[..600]).unwrap();
+    updater.clear().unwrap();
+    run(&mut updater).unwrap();
+    assert!(updater.flash().operations() > erased, "what was programmed is erased");
+}
+
 #[test]
 fn from_a_to_b_and_back() {
     let mut flash = flash_with(&image_a(), 1);

@@ -5,7 +5,10 @@ use crate::bench::{
     image_b, install, is_thorough, revert, run, stage, start, start_after, target, update,
 };
 use update::mock::{MockFlash, Weak};
-use update::{Crashes, Decision, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial, Updater, boot};
+use update::{
+    Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial,
+    Updater, boot,
+};
 
 fn trial(flash: &mut MockFlash) -> Trial {
     Trial::read(flash, &target().layout)
@@ -296,6 +299,30 @@ fn cut_everywhere(flash: &MockFlash, act: impl Fn(&mut MockFlash) -> bool, check
         }
     }
     println!("{cuts} cuts in {operations} operations");
+}
+
+/// What a master reads of the programs of a node, through an update that comes back and one that is confirmed.
+#[test]
+fn the_programs_in_the_flash_are_known_through_return_and_confirmation() {
+    let mut flash = flash_with(&image_a(), 1);
+    let known = |flash: &mut MockFlash| Programs::read(flash, &target().layout);
+    let [a, b] = [image_a(), image_b()].map(|image| image.header.code_crc());
+    assert_eq!(known(&mut flash), Programs { staged: a, ..Programs::default() });
+    update(&mut flash, &image_b().bytes()).unwrap();
+    assert_eq!((known(&mut flash).staged, known(&mut flash).kept), (b, a));
+    withdraw(&mut flash);
+    revert(&mut flash).unwrap();
+    assert_eq!((known(&mut flash).staged, known(&mut flash).kept), (b, a), "who was tried");
+
+    let about = Description { revokes: 1 << 3 | 1 << 7, ..description(9, 7) };
+    let next = Image::new(about, 900);
+    update(&mut flash, &next.bytes()).unwrap();
+    assert_eq!((known(&mut flash).counter, known(&mut flash).revoked_keys), (0, 0), "on trial");
+    confirm(&mut flash);
+    start(&mut flash);
+    let expected =
+        Programs { counter: 7, revoked_keys: 1 << 3 | 1 << 7, staged: next.header.code_crc(), kept: a };
+    assert_eq!(known(&mut flash), expected);
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! A signal from a CSV file: `time,value` in each line, times in seconds and rising.
 
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use thiserror::Error;
 
 use super::spec::number;
+
+/// The greatest size of a file in bytes: more than a million points.
+const LARGEST: u64 = 16 << 20;
 
 /// The reason why a CSV file cannot be used.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -56,7 +58,7 @@ impl Table {
     /// When the file cannot be read or has another form.
     pub fn open(path: &Path) -> Result<Self, TableError> {
         let name = path.display().to_string();
-        let text = fs::read_to_string(path)
+        let text = input::read_to_string(path, LARGEST)
             .map_err(|error| TableError::Read { path: name.clone(), reason: error.to_string() })?;
         Self::parse(&name, &text)
     }
@@ -110,6 +112,13 @@ fn point(line: &str) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_refused_at_once() {
+        let message = Table::open(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert_eq!(message, "cannot read /dev/zero: it is not a regular file");
+    }
 
     #[test]
     fn points_are_joined_by_lines() {

@@ -94,6 +94,7 @@ impl Client {
                 Action::Attach(adapter) => world.port(self.port).attach(Some(adapter)),
                 Action::Detach => world.port(self.port).detach_when_sent(),
                 Action::Send(frame) => world.port(self.port).send(frame, now),
+                Action::Close => self.leaving = true,
             }
         }
     }

@@ -17,6 +17,8 @@ pub(super) enum Action {
     Detach,
     /// Send a frame.
     Send(Frame),
+    /// Close the connection: the client does not speak the protocol.
+    Close,
 }
 
 impl Action {
@@ -36,7 +38,8 @@ pub(super) trait Session {
     /// The client has connected.
     fn greet(&mut self, out: &mut Vec<Action>);
 
-    /// Bytes have arrived from the client.
+    /// Bytes have arrived from the client. A client whose first bytes are not of the protocol is disconnected: any web page
+    /// can make a browser connect to a port, and choose what follows the browser's own first bytes (HTTP, TLS).
     fn on_bytes(&mut self, bytes: &[u8], out: &mut Vec<Action>);
 
     /// A frame of another participant was on the bus; returns the text for the client.

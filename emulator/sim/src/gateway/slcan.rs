@@ -73,12 +73,14 @@ pub(super) struct Slcan {
     open: Option<Adapter>,
     stamped: bool,
     line: Vec<u8>,
+    /// The client has sent a whole line.
+    has_spoken: bool,
 }
 
 impl Slcan {
     /// A session whose adapter runs at `bit_rate` (bit/s) until the client chooses another rate.
     pub(super) fn new(bit_rate: u32) -> Slcan {
-        Slcan { bit_rate, open: None, stamped: false, line: Vec::new() }
+        Slcan { bit_rate, open: None, stamped: false, line: Vec::new(), has_spoken: false }
     }
 
     fn on_line(&mut self, line: &[u8], out: &mut Vec<Action>) {
@@ -131,8 +133,11 @@ impl Session for Slcan {
                 b'\r' | b'\n' if self.line.is_empty() => {}
                 b'\r' => {
                     let line = std::mem::take(&mut self.line);
+                    self.has_spoken = true;
                     self.on_line(&line, out);
                 }
+                // Lines of the protocol have letters and digits only.
+                _ if !self.has_spoken && !byte.is_ascii_alphanumeric() => return out.push(Action::Close),
                 _ if self.line.len() < MAX_LINE => self.line.push(byte),
                 // The line is too long; it is refused at its end.
                 _ => {}
@@ -198,6 +203,17 @@ mod tests {
         assert_eq!(stamped.on_frame(&frame, at).as_deref(), Some("t081201FE1234\r"));
         talk(&mut stamped, "C\r");
         assert_eq!(stamped.on_frame(&frame, at), None);
+    }
+
+    #[test]
+    fn a_client_of_another_protocol_is_disconnected() {
+        for first in ["GET / HTTP/1.1\r\n", "OPTIONS *", "t1230 ", "\u{16}\u{3}\u{1}", "<"] {
+            let text = format!("{first}\rO\rt00020200\r");
+            assert_eq!(talk(&mut Slcan::new(250_000), &text), [Action::Close], "{text:?}");
+        }
+        let mut session = Slcan::new(250_000);
+        assert_eq!(talk(&mut session, "\r\n\rQ1\r"), [Action::stream("\x07")], "a command that is not known");
+        assert_eq!(talk(&mut session, "GET /\r"), [Action::stream("\x07")]);
     }
 
     #[test]

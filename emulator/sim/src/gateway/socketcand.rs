@@ -88,12 +88,14 @@ pub(super) struct Socketcand {
     bit_rate: u32,
     mode: Mode,
     input: Vec<u8>,
+    /// The client has begun a message.
+    has_spoken: bool,
 }
 
 impl Socketcand {
     /// A session on the bus with this name and bit rate (bit/s).
     pub(super) fn new(bus: &'static str, bit_rate: u32) -> Socketcand {
-        Socketcand { bus, bit_rate, mode: Mode::Closed, input: Vec::new() }
+        Socketcand { bus, bit_rate, mode: Mode::Closed, input: Vec::new(), has_spoken: false }
     }
 
     /// Acts on a message with its brackets, or on other bytes before a message.
@@ -153,6 +155,10 @@ impl Session for Socketcand {
             // Some clients end a message with a line feed or a zero (Flash sockets did).
             if self.input.is_empty() && (byte.is_ascii_whitespace() || byte == 0) {
                 continue;
+            }
+            self.has_spoken |= byte == b'<';
+            if !self.has_spoken {
+                return out.push(Action::Close);
             }
             self.input.push(byte);
             if byte == b'>' || self.input.len() > MAX_MESSAGE {
@@ -251,6 +257,17 @@ mod tests {
         for text in bad {
             assert_eq!(talk(&mut session, text), [Action::segment("< error bad arguments >")], "{text}");
         }
+    }
+
+    #[test]
+    fn a_client_of_another_protocol_is_disconnected() {
+        for first in ["GET / HTTP/1.1\r\n", "POST", "x", "\u{16}\u{3}\u{1}", ">< open vcan0 >"] {
+            let text = format!("{first}< open vcan0 >< send 000 2 2 0 >");
+            assert_eq!(talk(&mut Socketcand::new("vcan0", 250_000), &text), [Action::Close], "{text:?}");
+        }
+        let mut session = Socketcand::new("vcan0", 250_000);
+        assert!(!talk(&mut session, "\n\0 < open vcan0 >").contains(&Action::Close));
+        assert_eq!(talk(&mut session, "GET >"), [Action::segment("< error not a message >")]);
     }
 
     #[test]

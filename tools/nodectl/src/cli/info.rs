@@ -47,6 +47,11 @@ struct ProgramReport {
     running: bool,
     identification: Option<u32>,
     status: Option<String>,
+    trial: Option<&'static str>,
+    security_counter: Option<u32>,
+    revoked_keys: Option<Vec<u32>>,
+    downloaded: Option<u32>,
+    kept: Option<u32>,
 }
 
 impl Info {
@@ -103,12 +108,36 @@ fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>,
         return Ok(None);
     }
     let options = session.options.sdo();
+    // Devices of others have other objects at these places.
+    let is_ours = session.catalogue(node)?.is_of_this_project();
+    let mut own = |index, sub| if is_ours { number(session, node, index, sub) } else { Ok(None) };
+    let trial = own(0x2002, 1)?.and_then(trial);
+    let mut fact = |sub| own(0x2004, sub);
+    let (security_counter, revoked, downloaded, kept) = (fact(2)?, fact(3)?, fact(4)?, fact(5)?);
     let mut program = Program::new(&mut session.network, node, options);
     Ok(Some(ProgramReport {
+        trial,
+        security_counter,
+        revoked_keys: revoked.map(|keys| (0..8).filter(|key| keys >> key & 1 != 0).collect()),
+        downloaded: downloaded.filter(|&id| id != 0),
+        kept: kept.filter(|&id| id != 0),
         running: program.is_running()?,
         identification: program.identification()?,
         status: program.status()?.as_ref().map(Status::to_string),
     }))
+}
+
+/// The state of the trial in words (2002h:1 of a node of this project).
+fn trial(state: u32) -> Option<&'static str> {
+    Some(match state {
+        0 => "none",
+        1 => {
+            "the program is on trial: `nodectl confirm` keeps it, `nodectl rollback` restores the kept program"
+        }
+        2 => "the downloaded program was taken back after three starts",
+        3 => "the downloaded program was taken back: it was withdrawn, or not confirmed in time",
+        _ => return None,
+    })
 }
 
 fn number(session: &mut Session, node: NodeId, index: u16, sub: u8) -> Result<Option<u32>, Failure> {
@@ -150,6 +179,18 @@ impl fmt::Display for ProgramReport {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let state = if self.running { "running" } else { "stopped" };
         write!(f, "{state}, identification {}", hex(self.identification))?;
-        self.status.iter().try_for_each(|status| write!(f, ", flash {status}"))
+        self.status.iter().try_for_each(|status| write!(f, ", flash {status}"))?;
+        self.trial.iter().try_for_each(|trial| write!(f, "\n  trial             {trial}"))?;
+        if let Some(counter) = self.security_counter {
+            write!(f, "\n  security counter  {counter}")?;
+        }
+        if let Some(keys) = self.revoked_keys.as_ref().filter(|keys| !keys.is_empty()) {
+            let keys: Vec<String> = keys.iter().map(u32::to_string).collect();
+            write!(f, "\n  revoked keys      {}", keys.join(", "))?;
+        }
+        for (name, id) in [("downloaded", self.downloaded), ("kept", self.kept)] {
+            id.iter().try_for_each(|_| write!(f, "\n  {name:<18}{}", hex(id)))?;
+        }
+        Ok(())
     }
 }

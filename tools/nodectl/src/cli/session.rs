@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
-use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -97,13 +97,13 @@ impl Session {
     /// Starts a group of transfers with one node, which together have the time limit of one transfer. So a node that
     /// answers slowly on purpose cannot hold up the command longer, whatever the number of objects.
     pub(super) fn begin(&mut self) {
-        self.deadline = self.network.now() + self.options.sdo().limit;
+        self.deadline = self.network.own_time() + self.options.sdo().limit;
     }
 
     /// Starts a group of transfers for all objects of a node, which together have the time limit of [`MANY`] transfers.
     pub(super) fn begin_all(&mut self) {
         let limit = Duration(self.options.sdo().limit.0.saturating_mul(MANY));
-        self.deadline = self.network.now() + limit;
+        self.deadline = self.network.own_time() + limit;
     }
 
     /// The data sheets of the options.
@@ -315,11 +315,10 @@ pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
 
 /// A data sheet or a configuration file.
 pub(super) fn sheet(path: &Path) -> Result<Eds, Failure> {
-    let size = fs::metadata(path).map_err(|error| Failure::file(path, error))?.len();
-    if size > LARGEST_SHEET {
-        return Err(Failure::file(path, "it is larger than any data sheet (4 MiB)"));
-    }
-    let bytes = fs::read(path).map_err(|error| Failure::file(path, error))?;
+    let bytes = input::read(path, LARGEST_SHEET).map_err(|error| match error.kind() {
+        ErrorKind::FileTooLarge => Failure::file(path, "it is larger than any data sheet (4 MiB)"),
+        _ => Failure::file(path, error),
+    })?;
     let sheet = Eds::from_bytes(&bytes).map_err(|error| Failure::file(path, error))?;
     if sheet.objects.is_empty() {
         return Err(Failure::file(path, "it is no data sheet: there is no object in it"));

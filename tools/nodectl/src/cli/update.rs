@@ -1,7 +1,6 @@
 //! `nodectl update`
 
 use std::fmt;
-use std::fs;
 use std::path::PathBuf;
 
 use canopen::{Duration, NodeId};
@@ -14,6 +13,9 @@ use super::output::hex;
 use super::{Failure, Session};
 use crate::text::{note, visible};
 use crate::update::{Error, Image, Options, Outcome, Step, Watcher, update};
+
+/// The greatest size of an image in bytes: more than the flash of any microcontroller on a CAN bus.
+const LARGEST: u64 = 16 << 20;
 
 /// Replaces the program of nodes (CiA 302-3), one after the other.
 ///
@@ -74,7 +76,7 @@ impl Update {
     }
 
     fn image(&self) -> Result<Image, Failure> {
-        let bytes = fs::read(&self.image).map_err(|error| Failure::file(&self.image, error))?;
+        let bytes = input::read(&self.image, LARGEST).map_err(|error| Failure::file(&self.image, error))?;
         if self.raw {
             return Ok(Image::opaque(bytes));
         }

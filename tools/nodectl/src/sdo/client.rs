@@ -27,7 +27,8 @@ impl<'n> Client<'n> {
         Client { network, node, options, deadline: Instant::NEVER }
     }
 
-    /// The client with a common deadline for several transfers, besides the time limit of each transfer.
+    /// The client with a common deadline for several transfers, in [`Network::own_time`], besides the time limit of each
+    /// transfer.
     #[must_use]
     pub fn by(self, deadline: Instant) -> Client<'n> {
         Client { deadline, ..self }
@@ -98,7 +99,7 @@ impl<'n> Client<'n> {
     }
 
     fn options(&self) -> Options {
-        let left = self.deadline.0.saturating_sub(self.network.now().0);
+        let left = self.deadline.0.saturating_sub(self.network.own_time().0);
         Options { limit: Duration(self.options.limit.0.min(left)), ..self.options }
     }
 
@@ -116,6 +117,7 @@ impl<'n> Client<'n> {
         S: Service<Output = Result<(), sdo::Error>>,
     {
         let node = self.node;
+        self.network.pass()?;
         let deadline = self.network.now() + self.options().limit;
         if !self.network.wait_for_turn(node, deadline)? {
             return Err(Cause::Busy);

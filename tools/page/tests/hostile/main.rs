@@ -6,6 +6,7 @@ mod socket;
 use std::io::Write;
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 use page::{FromPage, Hub, Options, PageId, Server};
 
@@ -155,6 +156,44 @@ fn whatever_others_do_a_page_loses_nothing() {
     }
     drop((silent, half, nonsense, sockets));
     assert!(flooding.join().unwrap() > 0);
+}
+
+/// Connections that send requests and read no answer, with and without a valid `Host`, take every place. A page connects all
+/// the same.
+#[test]
+fn connections_that_read_nothing_lock_nobody_out() {
+    let bench = Bench::new();
+    let own = bench.address().to_string();
+    let deaf: Vec<_> = (0..200)
+        .map(|number| {
+            let host = if number % 4 == 0 { "evil.example" } else { &own };
+            let request = format!("GET /lib/chart.js HTTP/1.1\r\nHost: {host}\r\n\r\n");
+            let mut stream = connect(bench.address());
+            stream.set_write_timeout(Some(Duration::from_millis(20))).unwrap();
+            // The server closes some of them, and takes no more requests from others.
+            let _ = stream.write_all(request.repeat(200).as_bytes());
+            stream
+        })
+        .collect();
+    let (_page, _, writes) = bench.page(&format!("?token={}", bench.token()));
+    assert!(writes);
+    drop(deaf);
+}
+
+/// Pages without the token leave places for pages with it.
+#[test]
+fn pages_without_the_token_leave_places() {
+    let bench = Bench::new();
+    let token = bench.token();
+    let readers: Vec<Socket> = (0..40).filter_map(|_| Socket::open(bench.address(), "").ok()).collect();
+    let _page = Socket::open(bench.address(), &format!("?token={token}")).unwrap();
+    let mut writes = false;
+    let came = std::iter::from_fn(|| {
+        (!writes)
+            .then(|| matches!(bench.next(), FromPage::Came { writes: token, .. } if { writes = token; true }))
+    });
+    assert!(came.filter(|came| *came).count() <= 25, "24 without the token, and one with it");
+    drop(readers);
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod schedule;
 mod status;
 mod stimuli;
 mod tracer;
+mod turn;
 
 use std::io::{self, Read as _};
 use std::net::SocketAddr;

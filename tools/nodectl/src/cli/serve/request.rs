@@ -211,7 +211,6 @@ impl What {
                 | What::Differences { .. }
                 | What::Dcf { .. }
                 | What::Trace { .. }
-                | What::LssScan
                 | What::Pdos { .. }
                 | What::UpdateInspect { .. }
                 | What::Stimuli
@@ -325,6 +324,7 @@ mod tests {
         let writes = |text: &str| parse(text).unwrap().what.writes();
         assert!(writes(r#"{"id":1,"do":"nmt","node":"all","command":"start"}"#));
         assert!(writes(r#"{"id":1,"do":"stimulate","board":1,"kind":"pressure","spec":"const:1"}"#));
+        assert!(writes(r#"{"id":1,"do":"lss.scan"}"#), "it selects nodes");
         assert!(!writes(r#"{"id":1,"do":"pdos","node":1}"#));
     }
 }

@@ -28,6 +28,7 @@ use super::pump::{self, Refusal};
 use super::request::{What, Whom};
 use super::schedule::Lane;
 use super::stimuli;
+use super::turn::Turn;
 use crate::cli::store::Order;
 use crate::cli::{Failure, Options, Output, Session};
 use crate::sdo::Channel;
@@ -158,6 +159,7 @@ pub(super) fn begin(
     job: Job,
     number: u64,
     known: Option<Known>,
+    turn: Arc<Turn>,
     options: &Options,
     orders: &Sender<pump::Order>,
 ) {
@@ -165,7 +167,7 @@ pub(super) fn begin(
     let told = orders.clone();
     let run = move || {
         let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            work(job, number, known, &options, &orders)
+            work(job, number, known, turn, &options, &orders)
         }));
         let result = result
             .unwrap_or_else(|_| Err(Refusal::new("an error of this program: the request was given up")));
@@ -183,13 +185,16 @@ fn work(
     job: Job,
     number: u64,
     known: Option<Known>,
+    turn: Arc<Turn>,
     options: &Options,
     orders: &Sender<pump::Order>,
 ) -> Result<Json, Refusal> {
     let for_port = orders.clone();
     let interest = known.as_ref().map_or(job.interest, |known| Interest::Node(known.node, known.channel));
     let network = Network::open(move || Ok(port::open(&for_port, interest)));
-    let network = network.map_err(|error| Refusal::new(error.to_string()))?;
+    let mut network = network.map_err(|error| Refusal::new(error.to_string()))?;
+    let parked = orders.clone();
+    network.set_gate(move || turn.pass(|| drop(parked.send(pump::Order::Parked(number)))));
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
     session.has_many_nodes = true;
     if let Some(Known { node, channel, catalogue }) = known {

@@ -3,7 +3,7 @@
 use canopen::{Duration, Instant, NodeId};
 use serde_json::json;
 
-use super::{ACTIVE, AFTER_BOOT, ALONE, ASK_AGAIN, CALM, Pump, SETTLED};
+use super::{ACTIVE, AFTER_BOOT, ALONE, ASK_AGAIN, CALM, Pump, SETTLED, Waiting};
 use crate::bus::clock;
 use crate::cli::serve::jobs;
 use crate::cli::serve::nodes::Node;
@@ -95,7 +95,8 @@ impl Pump {
             .collect();
         for node in unknown {
             self.nodes.change(node).asked = Some(t);
-            self.enqueue(None, Lane::Node(node), Haste::Background, Some(node), jobs::identify(node));
+            let waiting = Waiting::of_server(node, jobs::identify(node));
+            self.enqueue(Lane::Node(node), Haste::Background, waiting);
         }
     }
 
@@ -116,8 +117,8 @@ impl Pump {
             }
             let objects = self.live.polled(node);
             if !objects.is_empty() {
-                let job = jobs::poll(node, objects);
-                self.enqueue(None, Lane::Node(node), Haste::Background, Some(node), job);
+                let waiting = Waiting::of_server(node, jobs::poll(node, objects));
+                self.enqueue(Lane::Node(node), Haste::Background, waiting);
             }
         }
     }

@@ -23,6 +23,7 @@ use super::port::Outlet;
 use super::schedule::Schedule;
 use super::status::{Count, Rate};
 use super::tracer::Tracer;
+use super::turn::Turn;
 use crate::Catalogue;
 use crate::bus::{Bus, BusError, clock};
 use crate::cli::Options;
@@ -66,6 +67,8 @@ pub(super) enum Order {
     Tell(Json),
     /// From a job: a fact about a node.
     Learned(NodeId, Learned),
+    /// From a job: it has stopped between two transfers.
+    Parked(u64),
     /// From a job: the result.
     Done(u64, Result<Json, Refusal>),
     /// From the simulator: a change of the stimuli.
@@ -91,6 +94,8 @@ struct Asker {
 struct Waiting {
     asker: Option<Asker>,
     node: Option<NodeId>,
+    /// Whether the job ends when its page leaves: it changes nothing on the bus.
+    only_reads: bool,
     job: Job,
 }
 
@@ -100,6 +105,8 @@ struct Running {
     asker: Option<Asker>,
     node: Option<NodeId>,
     is_update: bool,
+    only_reads: bool,
+    turn: Arc<Turn>,
 }
 
 /// The settings of the pump.

@@ -8,7 +8,7 @@ use canopen::NodeId;
 use page::{FromPage, PageId};
 use serde_json::{Value as Json, json};
 
-use super::{AT_ONCE, Asker, Order, PAUSE, PROTOCOL, Pump, Refusal};
+use super::{AT_ONCE, Asker, Order, PAUSE, PROTOCOL, Pump, Refusal, Waiting};
 use crate::bus::clock;
 use crate::cli::serve::jobs;
 use crate::cli::serve::live::Key;
@@ -43,6 +43,7 @@ impl Pump {
             Order::Page(FromPage::Left { page }) => {
                 self.pages.leave(page);
                 self.live.want(self.pages.follows());
+                self.drop_jobs(page);
             }
             Order::Page(FromPage::Said { page, text }) => self.hear(page, &text),
             // Without a bus the outlet is dropped, and the job notices the loss at its port.
@@ -52,6 +53,7 @@ impl Pump {
             Order::Progress(number, progress) => self.tell_progress(number, &progress),
             Order::Tell(event) => self.pages.tell(&self.setup.hub, &event),
             Order::Learned(node, learned) => self.learn(node, learned),
+            Order::Parked(number) => self.park(number),
             Order::Done(number, result) => self.finish(number, result),
             Order::Stimuli(news) => self.on_stimuli(news),
         }
@@ -135,6 +137,7 @@ impl Pump {
             }
             _ => None,
         };
+        let only_reads = !what.writes();
         let means = jobs::Means { control: self.setup.control, file, number: self.files };
         let task = match jobs::task(what, means) {
             Ok(task) => task,
@@ -158,7 +161,10 @@ impl Pump {
         if let Some(node) = node.filter(|_| task.job.is_update) {
             self.nodes.change(node).updating = true;
         }
-        self.enqueue(Some(asker), task.lane, Haste::Asked, node, task.job);
+        let has_token = self.pages.get(asker.page).is_some_and(|page| page.writes);
+        let haste = if has_token { Haste::Token } else { Haste::Asked };
+        let waiting = Waiting { asker: Some(asker), node, only_reads, job: task.job };
+        self.enqueue(task.lane, haste, waiting);
     }
 
     pub(super) fn follow(&mut self, page: PageId, signals: &[String]) -> Result<Json, Refusal> {
@@ -184,7 +190,7 @@ impl Pump {
     /// Surveys a node, unless a job of this node waits or runs.
     pub(super) fn survey(&mut self, node: NodeId) {
         if self.bus.is_ok() && !self.schedule.has(Lane::Node(node)) {
-            self.enqueue(None, Lane::Node(node), Haste::Asked, Some(node), jobs::survey(node));
+            self.enqueue(Lane::Node(node), Haste::Asked, Waiting::of_server(node, jobs::survey(node)));
         }
     }
 }

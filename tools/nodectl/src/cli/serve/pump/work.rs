@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use canopen::NodeId;
+use page::PageId;
 use serde_json::{Value as Json, json};
 
 use super::{Asker, Pump, Refusal, Running, Waiting};
@@ -10,32 +11,69 @@ use crate::bus::clock;
 use crate::cli::serve::jobs::{self, Job, Known, Learned};
 use crate::cli::serve::live::Key;
 use crate::cli::serve::schedule::{Haste, Lane};
+use crate::cli::serve::turn::Turn;
 use crate::sdo::Channel;
 
+impl Waiting {
+    /// A job of a node that no page has requested.
+    pub(super) fn of_server(node: NodeId, job: Job) -> Waiting {
+        Waiting { asker: None, node: Some(node), only_reads: false, job }
+    }
+}
+
 impl Pump {
-    pub(super) fn enqueue(
-        &mut self,
-        asker: Option<Asker>,
-        lane: Lane,
-        haste: Haste,
-        node: Option<NodeId>,
-        job: Job,
-    ) {
-        self.schedule.add(lane, haste, Waiting { asker, node, job });
+    pub(super) fn enqueue(&mut self, lane: Lane, haste: Haste, waiting: Waiting) {
+        let page = waiting.asker.as_ref().map(|asker| asker.page);
+        self.schedule.add(lane, haste, page, waiting);
     }
 
     pub(super) fn begin_jobs(&mut self) {
         let now = clock::now();
         let others = &self.others;
         while let Some((number, waiting)) = self.schedule.next(|node| others.is_busy(node, now)) {
-            let Waiting { asker, node, job } = waiting;
-            self.running.push(Running { number, asker, node, is_update: job.is_update });
+            let Waiting { asker, node, only_reads, job } = waiting;
+            let (is_update, turn) = (job.is_update, Arc::<Turn>::default());
+            self.running.push(Running {
+                number,
+                asker,
+                node,
+                is_update,
+                only_reads,
+                turn: Arc::clone(&turn),
+            });
             let known = node.and_then(|node| {
                 let catalogue = self.nodes.get(node)?.catalogue.clone()?;
                 Some(Known { node, channel: others.channel(node), catalogue })
             });
-            jobs::begin(job, number, known, &self.setup.options, &self.orders);
+            jobs::begin(job, number, known, turn, &self.setup.options, &self.orders);
         }
+        let turn = |number| self.running.iter().find(move |running| running.number == number);
+        self.schedule.to_park().filter_map(turn).for_each(|running| running.turn.hold());
+        while let Some(number) = self.schedule.resume() {
+            self.running.iter().filter(|running| running.number == number).for_each(|job| job.turn.resume());
+        }
+    }
+
+    /// A job has stopped between two transfers, unless it was resumed meanwhile.
+    pub(super) fn park(&mut self, number: u64) {
+        if self.running.iter().any(|running| running.number == number && running.turn.is_waiting()) {
+            self.schedule.park(number);
+        }
+    }
+
+    /// Drops the jobs of a page that has left. A job that changes something on the bus is finished once it has begun.
+    pub(super) fn drop_jobs(&mut self, page: PageId) {
+        for Waiting { node, job, .. } in self.schedule.leave(page) {
+            if let Some(node) = node.filter(|_| job.is_update) {
+                self.nodes.change(node).updating = false;
+            }
+        }
+        let of_page = |running: &&Running| running.asker.as_ref().is_some_and(|asker| asker.page == page);
+        self.running
+            .iter()
+            .filter(of_page)
+            .filter(|running| running.only_reads)
+            .for_each(|running| running.turn.end());
     }
 
     pub(super) fn tell_progress(&mut self, number: u64, progress: &Json) {

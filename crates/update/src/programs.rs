@@ -1,0 +1,38 @@
+//! What the areas of an update tell about the programs of a node: for an object of the application.
+
+use crate::area::{Area, Layout};
+use crate::flash::Flash;
+use crate::image;
+use crate::security::Security;
+
+/// The programs of a node. A number is 0 where the flash does not tell it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Programs {
+    /// The lowest security counter that an image may have.
+    pub counter: u32,
+    /// The revoked keys, bit n for key n.
+    pub revoked_keys: u8,
+    /// Identification of the newest downloaded program: the program on trial, or the one that was taken back.
+    pub staged: u32,
+    /// Identification of the program that was kept before the last update.
+    pub kept: u32,
+}
+
+impl Programs {
+    /// Reads the areas.
+    pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Programs {
+        let security = Security(layout.security());
+        Programs {
+            counter: security.least_counter(flash).unwrap_or(0),
+            revoked_keys: security.revoked(flash),
+            staged: identification(flash, layout.staging()),
+            kept: identification(flash, layout.kept()),
+        }
+    }
+}
+
+/// The identification of the image in an area.
+#[inline(never)]
+fn identification<F: Flash>(flash: &mut F, area: Area) -> u32 {
+    image::header(flash, area).map_or(0, |header| header.code_crc())
+}
