@@ -55,6 +55,7 @@ mod speed;
 mod ssi;
 mod supervision;
 mod tracker;
+mod trust;
 
 pub mod objects;
 

@@ -156,7 +156,7 @@ impl Fields {
     pub(super) fn position_parameters(&self, image: &[u8]) -> position::Parameters {
         let mut sensors = self.sensors.parameters(image);
         for (channel, references) in sensors.channels.iter_mut().zip(&self.references) {
-            channel.references = references.u8(image);
+            channel.references = [references.u8(image); 4];
         }
         position::Parameters {
             sensors,
