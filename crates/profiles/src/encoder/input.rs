@@ -252,8 +252,10 @@ impl Input {
         if !self.is_plausible(word, moved) {
             return self.stay();
         }
+        // The second word after a start may come late.
+        let missed = u32::from(self.tracker.is_none());
         self.step = self.take(word, moved, scale);
-        self.missed = 0;
+        self.missed = missed;
         self.note_edge();
         self.note_rest();
         let alarm = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };
@@ -394,7 +396,7 @@ impl Input {
         self.missed = self.missed.saturating_add(1);
         self.rest.miss();
         let lasts = self.missed > TOLERATED_MISSES;
-        let error = if lasts { SENSOR_POSITION_ERROR } else { 0 };
+        let error = if lasts || self.is_rejecting() { SENSOR_POSITION_ERROR } else { 0 };
         Observation {
             state: state | error | self.reference.state(),
             is_broken: lasts && state == SENSOR_NO_SIGNAL,
@@ -442,7 +444,6 @@ impl Input {
             (Basis::Start | Basis::Count, _) => self.offset.into(),
             _ => i64::from(word) + i64::from(self.offset),
         };
-        self.gap = GAP_SAMPLES;
         self.tracker = Some(Tracker::new(turn, bits, word, total));
     }
 

@@ -162,21 +162,22 @@ impl<D: Device> World<D> {
         self.run(millis);
     }
 
-    /// Turns until the index has come.
+    /// Turns until the index has come twice; a linear encoder passes its only mark, at zero.
     fn reference(&mut self) {
         self.run(3);
-        if self.shown.iter().any(|shown| shown.awaits_index) {
-            self.target = 0.2 * self.fastest();
-            if self.case.kind.is_linear() {
-                // The only mark is at zero.
-                self.target *= -4.0 * self.at.signum();
-            }
-            (0..200_000).any(|_| {
-                self.millisecond();
-                self.shown.iter().all(|shown| !shown.awaits_index)
-            });
-            self.rest(2);
+        if !self.shown.iter().any(|shown| shown.awaits_index) {
+            return;
         }
+        let (from, is_linear) = (self.at, self.case.kind.is_linear());
+        self.target = if is_linear { -0.9 * from.signum() } else { 0.2 } * self.fastest();
+        let has_passed = |at: f64| {
+            if is_linear { at.signum() != from.signum() } else { at - from > 2.5 * REVOLUTION as f64 }
+        };
+        while !has_passed(self.at) {
+            self.millisecond();
+        }
+        self.run(2);
+        self.rest(2);
     }
 
     fn event(&mut self) {
@@ -184,8 +185,10 @@ impl<D: Device> World<D> {
             0 => self.disturb(Fault::Silent, 20),
             1 => self.disturb(Fault::Silent, 600),
             2 if self.case.kind.is_absolute() => {
-                let away = self.random.below(self.code() as u64 / 2) as i64;
-                self.disturb(Fault::Jump(away + self.fastest() as i64 * 3), 300);
+                // Further than the sensor can move, either way: a smaller jump looks like a movement.
+                let least = 2 * self.fastest() as i64;
+                let away = least + self.random.below((self.code() - 2 * least) as u64) as i64;
+                self.disturb(Fault::Jump(away), 300);
             }
             3 => self.disturb(Fault::NoIndex, 200),
             4 => self.overspeed(),
