@@ -472,7 +472,7 @@ fn marks(sensor: &Sensor, scale: &Scale, basis: Basis, users: u8) -> Marks {
     Marks {
         is_used,
         turn: (!is_linear).then_some(sensor.resolution),
-        suffice: is_used && (is_linear || u64::from(scale.units()) % scale.range() == 0),
+        suffice: is_used && (is_linear || scale.repeats_after(sensor.resolution.get().into())),
         from_start: basis == Basis::Start,
         users,
     }

@@ -11,8 +11,6 @@
 //! Several users (presets of a channel, position units of a lift) have their own zero on one sensor. A preset by one
 //! user restores the trust in its own position alone.
 
-use core::num::NonZeroU64;
-
 use super::{Scale, Sensor, SensorType};
 
 /// All users of a sensor.
@@ -41,7 +39,8 @@ impl Basis {
         match sensor.kind {
             SensorType::Incremental | SensorType::LinearIncremental => Basis::Start,
             SensorType::IncrementalCounted | SensorType::LinearIncrementalCounted => Basis::Count,
-            _ if has_whole_ranges(sensor, scale) => Basis::Code,
+            // The code has a whole number of ranges.
+            _ if scale.repeats_after(1 << sensor.bits().min(32)) => Basis::Code,
             SensorType::LinearAbsolute => Basis::LongCode,
             SensorType::MultiTurn if sensor.format.revolution_bits() >= LONG => Basis::LongCode,
             _ => Basis::ShortCode,
@@ -52,13 +51,6 @@ impl Basis {
     pub(super) fn has_rounds(self) -> bool {
         matches!(self, Basis::LongCode | Basis::ShortCode)
     }
-}
-
-/// Whether the code of an absolute sensor has a whole number of ranges.
-fn has_whole_ranges(sensor: &Sensor, scale: &Scale) -> bool {
-    let units = (1 << sensor.bits().min(32)) * u64::from(scale.units());
-    // A turn and a range have at most 2^32 steps each, so their product fits 64 bits.
-    units % NonZeroU64::from(scale.turn()).saturating_mul(scale.range()) == 0
 }
 
 /// The trust in the position of one sensor.

@@ -14,8 +14,9 @@ use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{
-    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Module, RetainedState, SENSOR_HELD,
-    SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_POSITION_ERROR, Sensor, Start, area_state,
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Module, RetainedState, SENSOR_ALARM,
+    SENSOR_HELD, SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_TOO_FAST, SENSOR_UNREFERENCED, Sensor, Start,
+    area_state,
 };
 
 /// Number of position units in a device.
@@ -70,7 +71,12 @@ pub struct UnitParameters {
     pub offset: i32,
     /// Limits of the position (63B4h, 63B8h), compared like the work area of CiA 406.
     pub limits: Area,
+    /// Number of presets (2306h); 0 before the first one, [`NO_OFFSET`] when the offset has lost its meaning since.
+    pub references: u8,
 }
+
+/// Number of presets of a unit whose offset has lost its meaning: its sensor or its units have changed.
+pub const NO_OFFSET: u8 = u8::MAX;
 
 /// The parameters of the position units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +96,13 @@ pub struct Parameters {
 impl Default for UnitParameters {
     /// An unused unit.
     fn default() -> UnitParameters {
-        UnitParameters { source: None, operating: 0, offset: 0, limits: Area { low: 0, high: i32::MAX } }
+        UnitParameters {
+            source: None,
+            operating: 0,
+            offset: 0,
+            limits: Area { low: 0, high: i32::MAX },
+            references: 0,
+        }
     }
 }
 
@@ -146,13 +158,22 @@ impl Parameters {
     /// The parameters for the encoder: both channels count travel.
     #[inline(never)]
     fn encoder(&self) -> encoder::Parameters {
-        let channel = |own: ChannelParameters| ChannelParameters {
-            kind: own.kind,
-            resolution: own.resolution,
-            counted: own.counted,
-            fastest: own.fastest,
-            references: own.references,
-            ..ChannelParameters::default()
+        let [first, second] = self.sensors.channels;
+        let channel = |own: ChannelParameters, source: Source| {
+            let users = self.units.map(|unit| unit.source == Some(source));
+            let bit = |mask: u8, is_user| mask >> 1 | if is_user { 1 << (UNITS - 1) } else { 0 };
+            let count = |unit: UnitParameters| {
+                if unit.source == Some(source) && unit.references != NO_OFFSET { unit.references } else { 0 }
+            };
+            ChannelParameters {
+                kind: own.kind,
+                resolution: own.resolution,
+                counted: own.counted,
+                fastest: own.fastest,
+                users: users.into_iter().fold(0, bit),
+                references: self.units.map(count),
+                ..ChannelParameters::default()
+            }
         };
         encoder::Parameters {
             operating: 0,
@@ -160,7 +181,7 @@ impl Parameters {
             // Steps in nm and in 0.01 mm/s.
             step: u32::from(self.position_step.get()) * 10_000,
             speed_step: u32::from(self.speed_step.get()) * 10,
-            channels: self.sensors.channels.map(channel),
+            channels: [channel(first, Source::First), channel(second, Source::Second)],
             module: Module::default(),
             ..self.sensors
         }
@@ -208,6 +229,12 @@ struct Unit {
     offset: i32,
     range: i64,
     limits: Area,
+    /// The bit of the unit among the users of its sensor.
+    user: u8,
+    /// Whether nobody has said where the unit is.
+    needs_preset: bool,
+    /// An index says where the unit is.
+    has_mark: bool,
     /// The part of the values that depends on parameters alone.
     fixed: UnitValues,
 }
@@ -224,7 +251,19 @@ impl Unit {
             ..UnitValues::default()
         };
         let (source, range) = (own.source?, all.range(number)?);
-        Some(Unit { source, is_inverted, offset: own.offset, range, limits: own.limits, fixed })
+        let kind = sensor.kind;
+        let has_origin = kind.is_absolute() && !kind.is_counted();
+        Some(Unit {
+            source,
+            is_inverted,
+            offset: own.offset,
+            range,
+            limits: own.limits,
+            user: 1 << number,
+            needs_preset: own.references == NO_OFFSET || (own.references == 0 && !has_origin),
+            has_mark: own.references == 0 && kind.is_linear() && !kind.is_absolute() && sensor.index,
+            fixed,
+        })
     }
 
     #[inline(never)]
@@ -240,18 +279,23 @@ impl Unit {
             position,
             reading: if channel.reading == channel.position { position } else { at(channel.reading) },
             speed: if self.is_inverted { channel.speed.saturating_neg() } else { channel.speed },
-            state: area_state(&self.limits, &Module::default(), position, 0) | known(channel),
+            state: area_state(&self.limits, &Module::default(), position, 0) | self.known(channel),
             warnings,
             ..self.fixed
         }
     }
-}
 
-fn known(channel: &ChannelValues) -> u8 {
-    let unknown = if channel.sensor_state & SENSOR_HELD == 0 { 0 } else { UNKNOWN };
-    let is_read = channel.sensor_state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0;
-    let is_wrong = is_read && channel.sensor_state & SENSOR_POSITION_ERROR != 0;
-    unknown | if is_wrong { NOT_REFERENCED } else { 0 }
+    /// The bits of the state that say whether the position can be trusted.
+    fn known(&self, channel: &ChannelValues) -> u8 {
+        let state = channel.sensor_state;
+        let unknown = if state & SENSOR_HELD == 0 { 0 } else { UNKNOWN };
+        let is_read = state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0;
+        let is_marked = self.has_mark && state & SENSOR_UNREFERENCED == 0;
+        let is_wrong = channel.unknown & self.user != 0
+            || state & (SENSOR_ALARM | SENSOR_TOO_FAST) != 0
+            || (self.needs_preset && !is_marked);
+        unknown | if is_read && is_wrong { NOT_REFERENCED } else { 0 }
+    }
 }
 
 /// 63C0h: scaling (bit 2) is always on. The public text shows the direction in bit 0, 6380h has it in bit 3, so both
@@ -307,8 +351,8 @@ impl PositionUnits {
     /// Processes the readings of one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
         let encoder::Snapshot { channels, warnings, conditions, .. } = self.encoder.sample(raw);
-        let values =
-            |unit: Option<Unit>| unit.map(|unit| unit.values(&channels, warnings)).unwrap_or_default();
+        let absent = UnitValues { state: UNKNOWN, ..UnitValues::default() };
+        let values = |unit: Option<Unit>| unit.map_or(absent, |unit| unit.values(&channels, warnings));
         Snapshot { units: self.units.map(values), conditions }
     }
 

@@ -4,8 +4,12 @@ use profiles::board::{RETAINED_WORDS, RawEncoder, Retained};
 use profiles::encoder::{
     ALARM_POSITION, CODE_SEQUENCE, Command, DIRECTION, Encoder, Format, Parameters, PositionRecord,
     RetainedState, SCALING, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED, Scale, Sensor, Start,
+    WARNING_REFERENCE,
 };
+use profiles::lift::position::{self, NOT_REFERENCED, PositionUnits, Source, UNKNOWN, UnitValues};
 use profiles::profile::Chain;
+
+use std::num::NonZeroU32;
 
 use crate::shaft::Case;
 use crate::tally::Reset;
@@ -25,8 +29,8 @@ pub(crate) trait Device {
     fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2];
     /// Presets one of the positions, and stores all parameters.
     fn preset(&mut self, at: usize, value: u32, raw: &RawEncoder);
-    /// Counts the other way; `false` for a device that is not asked to.
-    fn turn_round(&mut self) -> bool;
+    /// Counts the other way.
+    fn turn_round(&mut self);
     /// Object 2109h; `false` for a device without it.
     fn acknowledge(&mut self) -> bool;
     fn restart(&mut self, reset: Reset);
@@ -96,10 +100,9 @@ impl Device for EncoderDevice {
         }
     }
 
-    fn turn_round(&mut self) -> bool {
+    fn turn_round(&mut self) {
         self.parameters.operating ^= if self.sensor().kind.is_linear() { DIRECTION } else { CODE_SEQUENCE };
         self.encoder.apply(&self.parameters);
-        true
     }
 
     fn acknowledge(&mut self) -> bool {
@@ -115,5 +118,70 @@ impl Device for EncoderDevice {
         self.encoder = Encoder::new(start(words, reset));
         self.parameters = self.stored;
         self.encoder.apply(&self.parameters);
+    }
+}
+
+/// Two position units with their own zero on one sensor.
+pub(crate) struct LiftDevice {
+    units: PositionUnits,
+    parameters: position::Parameters,
+    stored: position::Parameters,
+    values: [UnitValues; 2],
+}
+
+impl LiftDevice {
+    pub(crate) fn new(case: &Case) -> LiftDevice {
+        // The other pulley has a range that is no whole number of steps.
+        let travel = NonZeroU32::new(if case.is_scaled { 314_159 } else { 200_000 }).unwrap();
+        let sensors = Parameters { operating: 0, ..parameters(case) };
+        let mut parameters = position::Parameters { sensors, travel, ..position::Parameters::default() };
+        parameters.sensors.channels[1].kind = None;
+        parameters.units[..2].iter_mut().for_each(|unit| unit.source = Some(Source::First));
+        let units = PositionUnits::default();
+        let mut device = LiftDevice { units, parameters, stored: parameters, values: Default::default() };
+        device.units.apply(&parameters);
+        device
+    }
+}
+
+impl Device for LiftDevice {
+    fn sensor(&self) -> Sensor {
+        self.parameters.sensors.sensors().next().unwrap()
+    }
+
+    fn scale(&self) -> Scale {
+        let step = NonZeroU32::new(u32::from(self.parameters.position_step.get()) * 10_000).unwrap();
+        Scale::along(&self.sensor().native(), self.parameters.travel, step).unwrap()
+    }
+
+    fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2] {
+        let [first, second, ..] = self.units.sample(raw).units;
+        self.values = [first, second];
+        self.values.map(|values| Shown {
+            position: values.position,
+            is_condemned: values.state & (UNKNOWN | NOT_REFERENCED) != 0,
+            awaits_index: self.parameters.sensors.index && values.warnings & WARNING_REFERENCE != 0,
+        })
+    }
+
+    fn preset(&mut self, at: usize, value: u32, _: &RawEncoder) {
+        let offset = self.parameters.preset(at, self.values[at].reading, value).unwrap();
+        let unit = &mut self.parameters.units[at];
+        (unit.offset, unit.references) = (offset, unit.references % 200 + 1);
+        self.stored = self.parameters;
+        self.units.apply(&self.parameters);
+    }
+
+    fn turn_round(&mut self) {}
+
+    fn acknowledge(&mut self) -> bool {
+        false
+    }
+
+    fn restart(&mut self, reset: Reset) {
+        let words = self.units.retained_state().to_words();
+        self.units = PositionUnits::new(start(words, reset));
+        self.parameters = self.stored;
+        self.units.apply(&self.parameters);
     }
 }

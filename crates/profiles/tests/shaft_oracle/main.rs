@@ -10,7 +10,7 @@ mod devices;
 mod shaft;
 mod tally;
 
-use devices::{Device, EncoderDevice};
+use devices::{Device, EncoderDevice, LiftDevice};
 use profiles::encoder::SensorType;
 use shaft::{Case, World};
 use tally::Tally;
@@ -55,4 +55,9 @@ fn judge<D: Device>(seed: u64, new: impl Fn(&Case) -> D) -> Tally {
 #[test]
 fn an_encoder_never_shows_a_wrong_position_as_right() {
     judge(1, EncoderDevice::new).assert_good();
+}
+
+#[test]
+fn position_units_of_a_lift_never_show_a_wrong_position_as_right() {
+    judge(1000, LiftDevice::new).assert_good();
 }

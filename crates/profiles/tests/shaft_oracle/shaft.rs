@@ -217,13 +217,15 @@ impl<D: Device> World<D> {
         self.run(100);
     }
 
+    /// Counts the other way, which leaves the position as it is. Where a position is not known, only a preset says what
+    /// it is afterwards.
     fn turn_round(&mut self) {
         let steps = self.steps();
-        if self.device.turn_round() {
-            let scale = self.device.scale();
-            for anchor in self.anchors.iter_mut().flatten() {
-                *anchor = Anchor { value: anchor.expected(steps), steps, scale };
-            }
+        self.device.turn_round();
+        let scale = self.device.scale();
+        for (anchor, shown) in self.anchors.iter_mut().zip(&self.shown) {
+            let known = anchor.filter(|_| !shown.is_condemned);
+            *anchor = known.map(|anchor| Anchor { value: anchor.expected(steps), steps, scale });
         }
     }
 
@@ -312,7 +314,10 @@ impl<D: Device> World<D> {
             way = self.speed * (time - time * time / (2.0 * stop));
             self.speed *= 1.0 - time / stop;
         }
-        self.at += way;
+        // A long code is longer than the way of its shaft while the power is off.
+        let most = 0.24 * self.code() as f64;
+        let is_long = matches!(self.case.kind, SensorType::MultiTurn | SensorType::LinearAbsolute);
+        self.at += if is_long { way.clamp(-most, most) } else { way };
     }
 
     fn start(&mut self, reset: Reset) {

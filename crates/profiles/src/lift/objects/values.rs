@@ -6,7 +6,7 @@ use crate::encoder::Area;
 use crate::encoder::objects::Sensors;
 use crate::lift::devices::Devices;
 use crate::lift::load::{self, Point};
-use crate::lift::position::{self, Source, UNITS, UnitParameters, UnitValues};
+use crate::lift::position::{self, NO_OFFSET, Source, UNITS, UnitParameters, UnitValues};
 use crate::lift::{Parameters, Snapshot};
 use crate::pressure::objects::Places;
 use canopen::dictionary::{Dictionary, Field};
@@ -20,8 +20,6 @@ pub struct Fields {
     pub(super) sensors: Sensors,
     pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
-    /// For each channel: how many presets have confirmed the position of its sensor.
-    pub(super) references: [Field; 2],
     travel: Field,
     position_step: Field,
     speed_step: Field,
@@ -42,6 +40,8 @@ pub(super) struct UnitFields {
     pub(super) source: Field,
     pub(super) offset: Field,
     pub(super) state: Field,
+    /// Number of presets: see [`UnitParameters::references`].
+    pub(super) references: Field,
     pub(super) operating: Field,
     pub(super) position: Field,
     pub(super) reading: Field,
@@ -59,6 +59,7 @@ impl UnitFields {
             source: d.field(0x2301, sub),
             offset: d.field(0x2302, sub),
             state: d.field(0x2303, sub),
+            references: d.field(0x2306, sub),
             operating: d.field(0x6380, sub),
             position: d.field(0x6383, sub),
             reading: d.field(0x2304, sub),
@@ -78,6 +79,15 @@ impl UnitFields {
             operating: self.operating.u16(image),
             offset: integer(self.offset, image),
             limits: Area { low, high },
+            references: self.references.u8(image),
+        }
+    }
+
+    /// The offset has lost its meaning. A unit that has never been preset has none.
+    pub(super) fn drop_offset(&self, image: &mut [u8]) {
+        self.offset.store(image, [0; 4]);
+        if self.references.u8(image) != 0 {
+            self.references.store(image, [NO_OFFSET]);
         }
     }
 
@@ -110,7 +120,6 @@ impl Fields {
                 UnitFields::new(d, 3),
                 UnitFields::new(d, 4),
             ],
-            references: pair(d, 0x2306, 1),
             travel: d.field(0x2300, 0),
             position_step: d.field(0x6384, 1),
             speed_step: d.field(0x6384, 2),
@@ -154,12 +163,8 @@ impl Fields {
     }
 
     pub(super) fn position_parameters(&self, image: &[u8]) -> position::Parameters {
-        let mut sensors = self.sensors.parameters(image);
-        for (channel, references) in sensors.channels.iter_mut().zip(&self.references) {
-            channel.references = [references.u8(image); 4];
-        }
         position::Parameters {
-            sensors,
+            sensors: self.sensors.parameters(image),
             travel: NonZeroU32::new(self.travel.u32(image)).unwrap_or(NonZeroU32::MIN),
             position_step: NonZeroU16::new(self.position_step.u16(image)).unwrap_or(NonZeroU16::MIN),
             speed_step: NonZeroU16::new(self.speed_step.u16(image)).unwrap_or(NonZeroU16::MIN),
