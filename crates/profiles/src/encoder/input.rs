@@ -252,10 +252,8 @@ impl Input {
         if !self.is_plausible(word, moved) {
             return self.stay();
         }
-        // The second word after a start may come late.
-        let missed = u32::from(self.tracker.is_none());
         self.step = self.take(word, moved, scale);
-        self.missed = missed;
+        self.missed = 0;
         self.note_edge();
         self.note_rest();
         let alarm = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };

@@ -244,15 +244,17 @@ fn with_limit(sensor: Sensor) -> Sensor {
     Sensor { fastest: automatic(&sensor), ..sensor }
 }
 
-/// The most steps in a millisecond at [`HIGHEST_SPEED`] or [`HIGHEST_RATE`]: rounded up, and one for the places of the
-/// steps. Half a turn in a millisecond could be either direction; the limit is well below that.
+/// The most steps in a millisecond at [`HIGHEST_SPEED`] or [`HIGHEST_RATE`], and 3 % for the instants of the readings:
+/// the second one after a start comes late. Half a turn in a millisecond could be either direction; the limit is well
+/// below that.
 pub(super) fn automatic(sensor: &Sensor) -> u32 {
     let resolution = sensor.resolution().max(1);
-    if sensor.kind.is_linear() {
-        HIGHEST_RATE.div_ceil(resolution).saturating_add(1)
+    let steps = if sensor.kind.is_linear() {
+        HIGHEST_RATE.div_ceil(resolution)
     } else {
-        resolution.div_ceil(60_000 / HIGHEST_SPEED).saturating_add(1)
-    }
+        resolution.div_ceil(60_000 / HIGHEST_SPEED)
+    };
+    steps.saturating_add(steps / 32)
 }
 
 fn direction_bit(sensor: &Sensor) -> u16 {

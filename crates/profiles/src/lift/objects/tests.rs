@@ -132,7 +132,7 @@ fn every_parameter_is_saved_and_nothing_else() {
         .filter(|row| (row.access == Access::ReadWrite) != (row.group == Some(Group::Application)))
         .map(|row| row.index)
         .collect();
-    assert_eq!(others, [0x2322, 0x2322, 0x6011], "outputs");
+    assert_eq!(others, [0x2306, 0x2306, 0x2306, 0x2306, 0x2322, 0x2322, 0x6011], "presets, outputs");
 }
 
 /// Except for the trial of a program, the words of the panel and the lift number, which do not concern the measurement,
