@@ -191,7 +191,7 @@ fn the_other_direction_leaves_the_position_and_turns_the_speed() {
 
 #[test]
 fn units_of_one_sensor_have_their_own_zero_direction_and_limits() {
-    let mut parameters = with_sensor(SensorType::LinearIncremental, 100_000);
+    let mut parameters = with_sensor(SensorType::LinearIncrementalCounted, 100_000);
     let limits = Area { low: 500, high: 1500 };
     let second = UnitParameters {
         source: Some(Source::First),

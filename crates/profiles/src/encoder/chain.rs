@@ -57,6 +57,7 @@ impl Encoder {
     /// An encoder after power-on. There is no position until parameters are applied: the first parameters tell whether
     /// the retained positions belong to these sensors.
     #[must_use]
+    #[inline(never)]
     pub fn new(start: Start) -> Encoder {
         Encoder {
             channels: [None, None],

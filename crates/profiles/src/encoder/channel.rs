@@ -183,6 +183,7 @@ impl Channel {
     }
 
     /// Accepts rejected readings, where the reading alone is the position.
+    #[inline(never)]
     pub(super) fn believe(&mut self) {
         self.input.believe();
     }

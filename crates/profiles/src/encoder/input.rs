@@ -95,23 +95,24 @@ impl Input {
         users: u8,
         retained: &RetainedChannel,
     ) -> Input {
-        let basis = Basis::of(&sensor, scale);
+        let (basis, marks) = marks(&sensor, scale, users);
         let is_same = retained.is_of(sensor.kind, sensor.resolution());
-        let is_forgotten = retained.kind == 0 && retained.trust.lost != 0;
+        let is_forgotten = retained.kind == 0 && retained.trust.lost() != 0;
+        let needs_memory = retained.trust.has(Trust::NEEDS_MEMORY) && basis == Basis::LongCode;
         let is_lost = if is_forgotten {
-            basis != Basis::LongCode || retained.needs_memory
+            basis != Basis::LongCode || needs_memory
         } else {
             retained.kind != 0 && !is_same && sensor.kind.is_counted()
         };
         let known = if is_same { retained.trust } else { Trust::default() };
-        let trust = Trust::at_start((!is_lost).then_some(known), basis);
+        let trust = Trust::at_start(if is_lost { Trust::NONE } else { known }, basis);
         Input {
             sensor,
             offset,
             last: if is_same { *retained } else { RetainedChannel::default() },
             basis,
-            reference: Reference::new(marks(&sensor, scale, basis, users), trust),
-            needs_memory: retained.needs_memory && basis == Basis::LongCode,
+            reference: Reference::new(marks, trust),
+            needs_memory,
             tracker: None,
             missed: 0,
             step: 0,
@@ -130,8 +131,9 @@ impl Input {
     /// Takes other parameters of the same sensor: moves the zero, and counts in the turns of this scale.
     pub(super) fn apply(&mut self, sensor: Sensor, scale: &Scale, offset: i32, users: u8) {
         self.sensor = sensor;
-        self.basis = Basis::of(&sensor, scale);
-        self.reference.apply(marks(&sensor, scale, self.basis, users));
+        let (basis, marks) = marks(&sensor, scale, users);
+        self.basis = basis;
+        self.reference.apply(marks);
         self.needs_memory &= self.basis == Basis::LongCode;
         let moved = i64::from(offset) - i64::from(self.offset);
         self.offset = offset;
@@ -165,6 +167,7 @@ impl Input {
     }
 
     /// Accepts rejected readings.
+    #[inline(never)]
     fn accept(&mut self) {
         if let (Some(tracker), Some(implausible)) = (&mut self.tracker, self.implausible.take()) {
             tracker.follow(implausible.word());
@@ -218,16 +221,20 @@ impl Input {
     #[inline]
     pub(super) fn retained(&self, resolution: u32) -> RetainedChannel {
         let mut trust = self.reference.trust();
-        trust.moving = self.rest.is_moving();
-        trust.lost = if self.implausible.is_some() { ALL } else { trust.lost };
-        let needs_memory = self.needs_memory;
+        let flag = |is_set: bool, flag: u8| if is_set { flag } else { 0 };
+        trust.flags = trust.flags & Trust::REFERENCED
+            | flag(self.rest.is_moving(), Trust::MOVING)
+            | flag(self.needs_memory, Trust::NEEDS_MEMORY);
+        if self.implausible.is_some() {
+            trust.lose();
+        }
         match &self.tracker {
             Some(tracker) => {
                 let (kind, total) = (self.sensor.kind.code(), tracker.total());
-                RetainedChannel { kind, resolution, total, trust, needs_memory }
+                RetainedChannel { kind, resolution, total, trust }
             }
             None if self.last.kind != 0 => self.last,
-            None => RetainedChannel { trust, needs_memory, ..RetainedChannel::default() },
+            None => RetainedChannel { trust, ..RetainedChannel::default() },
         }
     }
 
@@ -252,17 +259,12 @@ impl Input {
         if !self.is_plausible(word, moved) {
             return self.stay();
         }
-        self.step = self.take(word, moved, scale);
+        self.take(word, moved, scale);
         self.missed = 0;
         self.note_edge();
         self.note_rest();
         let alarm = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };
-        Observation {
-            state: alarm | self.reference.state(),
-            moved: self.step,
-            code: reading.code,
-            is_broken: false,
-        }
+        Observation { state: alarm | self.reference.state(), moved, code: reading.code, is_broken: false }
     }
 
     /// Milliseconds since the last reading that was accepted.
@@ -296,8 +298,8 @@ impl Input {
     fn is_uncertain(&self) -> bool {
         let gap = if self.gap > 0 { GAP_MILLIS } else { 0 };
         // In a gap the time is not known, so the speed counts as uncertain too.
-        let way = u64::from(self.step.unsigned_abs()) * u64::from(gap);
-        let away = deviation(self.limit(), self.unread().saturating_add(gap)) + way;
+        let way = self.step.unsigned_abs().saturating_mul(gap);
+        let away = deviation(self.limit(), self.unread().saturating_add(gap)).saturating_add(way);
         away >= 1 << (self.sensor.bits() - 1)
     }
 
@@ -308,20 +310,24 @@ impl Input {
 
     /// Takes a reading that is `moved` steps from the last one.
     #[inline]
-    fn take(&mut self, word: u32, moved: i32, scale: &Scale) -> i32 {
-        if self.tracker.is_some() && self.unread() + u32::from(self.gap) > 1 && self.loses_rounds() {
+    fn take(&mut self, word: u32, moved: i32, scale: &Scale) {
+        let Some(tracker) = &mut self.tracker else { return self.begin(word, scale) };
+        tracker.advance(word, moved);
+        self.step = moved;
+        if self.missed > 0 || self.gap > 0 || self.implausible.is_some() {
+            self.end_outage();
+        }
+    }
+
+    /// Readings are back. If the code may have wrapped in the meantime, the number of wraps is not known.
+    #[inline(never)]
+    fn end_outage(&mut self) {
+        // Cannot be zero.
+        self.step = self.step.checked_div(self.unread().cast_signed()).unwrap_or(0);
+        if self.basis.has_rounds() && self.is_uncertain() {
             self.reference.lose();
         }
         self.implausible = None;
-        match &mut self.tracker {
-            Some(tracker) => tracker.advance(word, moved),
-            None => self.begin(word, scale),
-        }
-        moved
-    }
-
-    fn loses_rounds(&self) -> bool {
-        self.basis.has_rounds() && self.is_uncertain()
     }
 
     /// Takes note of a movement, and of one right after the start: the sensor has moved before, unseen.
@@ -408,7 +414,7 @@ impl Input {
         if self.gap > 0 && self.is_uncertain() {
             self.reference.unseen();
         }
-        self.step = self.take(word, moved, scale);
+        self.take(word, moved, scale);
         self.note_rest();
         let fastest = self.sensor.fastest;
         let is_fast = moved.unsigned_abs() > fastest && fastest > 0 && self.gap == 0;
@@ -463,17 +469,20 @@ impl Input {
     }
 }
 
-/// Properties of a sensor's index.
-fn marks(sensor: &Sensor, scale: &Scale, basis: Basis, users: u8) -> Marks {
+/// What determines the position of a sensor, and the properties of its index.
+#[inline(never)]
+fn marks(sensor: &Sensor, scale: &Scale, users: u8) -> (Basis, Marks) {
+    let basis = Basis::of(sensor, scale);
     let is_used = sensor.index && !sensor.kind.is_absolute();
     let is_linear = sensor.kind.is_linear();
-    Marks {
+    let marks = Marks {
         is_used,
         turn: (!is_linear).then_some(sensor.resolution),
         suffice: is_used && (is_linear || scale.repeats_after(sensor.resolution.get().into())),
         from_start: basis == Basis::Start,
         users,
-    }
+    };
+    (basis, marks)
 }
 
 /// Steps to the nearest zero of a revolution.

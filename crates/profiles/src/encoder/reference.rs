@@ -104,8 +104,11 @@ impl Reference {
     /// The trust to be retained for the next start.
     #[inline]
     pub(super) fn trust(&self) -> Trust {
-        let is_wrong = self.index != Index::Right;
-        Trust { doubted: if is_wrong { ALL } else { self.trust.doubted }, ..self.trust }
+        let mut trust = self.trust;
+        if self.index != Index::Right {
+            trust.doubt();
+        }
+        trust
     }
 
     /// Takes note of a movement.
@@ -124,13 +127,13 @@ impl Reference {
 
     /// Steps may have been lost.
     pub(super) fn doubt(&mut self) {
-        self.trust.doubted = ALL;
+        self.trust.doubt();
         self.settle();
     }
 
     /// Turns may have been lost.
     pub(super) fn lose(&mut self) {
-        self.trust.lost = ALL;
+        self.trust.lose();
         self.settle();
     }
 
@@ -145,7 +148,7 @@ impl Reference {
     #[inline]
     pub(super) fn index(&mut self, error: i64, since: i32) -> i64 {
         let is_right = error.unsigned_abs() <= TOLERANCE;
-        if is_right && self.trust.referenced && self.unknown == 0 && self.index == Index::Right {
+        if is_right && self.trust.has(Trust::REFERENCED) && self.unknown == 0 && self.index == Index::Right {
             self.since = since;
             return 0;
         }
@@ -157,13 +160,13 @@ impl Reference {
     fn doubtful_index(&mut self, error: i64, since: i32) -> i64 {
         let apart = self.since.wrapping_sub(since).unsigned_abs();
         self.since = since;
-        let is_first = !core::mem::replace(&mut self.trust.referenced, true);
+        let is_first = !self.trust.has(Trust::REFERENCED);
+        self.trust.flags |= Trust::REFERENCED;
         let is_right = error.unsigned_abs() <= TOLERANCE;
         let is_believed = is_first || is_right || self.agrees(error, apart);
         if is_believed {
             self.index = Index::Right;
-            self.trust.doubted = 0;
-            self.trust.lost = if self.marks.suffice { 0 } else { self.trust.lost };
+            self.trust.users = if self.marks.suffice { 0 } else { self.trust.lost() };
         } else if self.is_another(apart) || !matches!(self.index, Index::Elsewhere(_)) {
             self.index = Index::Elsewhere(error);
         }
@@ -178,9 +181,9 @@ impl Reference {
         if self.index == Index::Missing {
             self.since = 0;
         }
-        let Trust { lost, doubted, .. } = self.trust();
+        self.trust = self.trust();
         self.index = Index::Right;
-        (self.trust.lost, self.trust.doubted) = (lost & !user, doubted & !user);
+        self.trust.users &= !(user | user << 4);
         self.settle();
         correction
     }
@@ -206,11 +209,11 @@ impl Reference {
 
     #[inline(never)]
     fn settle(&mut self) {
-        let Trust { referenced, lost, doubted, .. } = self.trust;
+        let referenced = self.trust.has(Trust::REFERENCED);
         let Marks { is_used, from_start, users, .. } = self.marks;
         let is_wrong = self.index != Index::Right;
-        self.unknown = if is_wrong { ALL } else { lost | doubted };
-        let (lost, doubted) = (lost & users != 0, doubted & users != 0);
+        self.unknown = if is_wrong { ALL } else { self.trust.unknown() };
+        let (lost, doubted) = (self.trust.users & users != 0, self.trust.users >> 4 & users != 0);
         let bit = |set: bool, bits: u8| if set { bits } else { 0 };
         self.state = bit(lost || (is_used && !referenced), SENSOR_UNREFERENCED)
             | bit((lost && !from_start) || doubted, SENSOR_POSITION_ERROR)
@@ -235,7 +238,7 @@ mod tests {
 
     /// A reference that has seen its index.
     fn seen() -> Reference {
-        Reference::new(marks(), Trust { referenced: true, ..Trust::default() })
+        Reference::new(marks(), Trust { users: 0, flags: Trust::REFERENCED })
     }
 
     #[test]
@@ -306,7 +309,7 @@ mod tests {
         reference.lose();
         reference.index(0, 0);
         assert_eq!(reference.state(), SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR);
-        assert_eq!(reference.trust().lost, ALL);
+        assert_eq!(reference.trust().lost(), ALL);
         reference.preset(ALL);
         assert_eq!(reference.state(), 0);
         let mut reference = Reference::new(Marks { suffice: true, ..marks() }, Trust::default());

@@ -51,14 +51,13 @@ pub struct RetainedChannel {
     pub(super) resolution: u32,
     pub(super) total: i64,
     pub(super) trust: Trust,
-    /// The code may have wrapped, so the reading alone does not tell the position, though the sensor is absolute.
-    pub(super) needs_memory: bool,
 }
 
 impl RetainedChannel {
     /// A channel that has lost its position with the memory.
     fn forgotten(needs_memory: bool) -> RetainedChannel {
-        RetainedChannel { trust: Trust::NONE, needs_memory, ..RetainedChannel::default() }
+        let flags = if needs_memory { Trust::NEEDS_MEMORY } else { 0 };
+        RetainedChannel { trust: Trust { flags, ..Trust::NONE }, ..RetainedChannel::default() }
     }
 
     /// Whether a sensor of this type has left the state.
@@ -139,7 +138,7 @@ impl PositionRecord {
         let RetainedState { channels: [first, second], operating_time } = RetainedState::from_words(retained);
         PositionRecord {
             tenths: operating_time.tenths,
-            needs_memory: [first.needs_memory, second.needs_memory],
+            needs_memory: [first, second].map(|channel| channel.trust.has(Trust::NEEDS_MEMORY)),
         }
     }
 
@@ -207,7 +206,7 @@ impl RetainedState {
 }
 
 /// Marks the layout of the words: words of another layout say nothing about the position.
-const LAYOUT: u8 = 2 << 4;
+const LAYOUT: u8 = 2;
 
 impl RetainedChannel {
     /// Words of the stored form.
@@ -216,26 +215,20 @@ impl RetainedChannel {
     /// The stored form.
     #[inline]
     pub(super) fn to_words(self) -> [u32; CHANNEL] {
-        let [users, flags] = self.trust.to_bytes();
-        let flags = u32::from_le_bytes([self.kind, users, flags, LAYOUT | u8::from(self.needs_memory)]);
+        let Trust { users, flags } = self.trust;
         let [total, total_high] = halves(self.total.cast_unsigned());
-        [flags, self.resolution, total, total_high]
+        [u32::from_le_bytes([self.kind, users, flags, LAYOUT]), self.resolution, total, total_high]
     }
 
+    #[inline(never)]
     fn from_words(words: &[u32; CHANNEL]) -> RetainedChannel {
         let [first, resolution, total, total_high] = *words;
-        let [kind, users, flags, last] = first.to_le_bytes();
-        let needs_memory = last & 1 != 0;
-        if first != 0 && last & !1 != LAYOUT {
+        let [kind, users, flags, layout] = first.to_le_bytes();
+        if first != 0 && layout != LAYOUT {
             return RetainedChannel::forgotten(true);
         }
-        RetainedChannel {
-            kind,
-            resolution,
-            total: whole([total, total_high]).cast_signed(),
-            trust: Trust::from_bytes([users, flags]),
-            needs_memory,
-        }
+        let total = whole([total, total_high]).cast_signed();
+        RetainedChannel { kind, resolution, total, trust: Trust { users, flags } }
     }
 }
 
@@ -258,9 +251,9 @@ mod tests {
     prop_compose! {
         fn any_channel()(
             (kind, resolution, total) in any::<(u8, u32, i64)>(),
-            (users, flags, needs_memory) in (any::<u8>(), 0..4_u8, any::<bool>()),
+            (users, flags) in any::<(u8, u8)>(),
         ) -> RetainedChannel {
-            RetainedChannel { kind, resolution, total, trust: Trust::from_bytes([users, flags]), needs_memory }
+            RetainedChannel { kind, resolution, total, trust: Trust { users, flags } }
         }
     }
 

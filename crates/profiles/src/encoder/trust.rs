@@ -53,48 +53,59 @@ impl Basis {
     }
 }
 
-/// The trust in the position of one sensor.
+/// The trust in the position of one sensor, in its stored form.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Trust {
-    /// The index has been seen.
-    pub(super) referenced: bool,
-    /// A bit for each user for whom turns have been lost.
-    pub(super) lost: u8,
-    /// A bit for each user for whom steps may have been lost.
-    pub(super) doubted: u8,
-    /// The shaft turned at the last sample, or gave no reading.
-    pub(super) moving: bool,
+    /// Low half: a bit for each user for whom turns have been lost; high half: for whom steps may have been lost.
+    pub(super) users: u8,
+    pub(super) flags: u8,
 }
 
 impl Trust {
     /// Nothing is known.
-    pub(super) const NONE: Trust = Trust { referenced: false, lost: ALL, doubted: 0, moving: false };
+    pub(super) const NONE: Trust = Trust { users: ALL, flags: 0 };
+    /// Flag: the index has been seen.
+    pub(super) const REFERENCED: u8 = 1 << 0;
+    /// Flag: the shaft turned at the last sample, or gave no reading.
+    pub(super) const MOVING: u8 = 1 << 1;
+    /// Flag: a long code may have wrapped, so the reading alone does not tell the position.
+    pub(super) const NEEDS_MEMORY: u8 = 1 << 2;
 
     /// At the start with the retained trust of this sensor.
-    pub(super) fn at_start(retained: Option<Trust>, basis: Basis) -> Trust {
-        match (basis, retained) {
-            (Basis::Code, _) => Trust::default(),
-            (Basis::Start, _) | (_, None) => Trust::NONE,
-            (Basis::LongCode, Some(trust)) => trust,
-            (Basis::ShortCode | Basis::Count, Some(trust)) if trust.moving => trust.unseen(),
-            (_, Some(trust)) => trust,
+    pub(super) fn at_start(retained: Trust, basis: Basis) -> Trust {
+        match basis {
+            Basis::Code => Trust::default(),
+            Basis::Start => Trust::NONE,
+            Basis::ShortCode | Basis::Count if retained.has(Trust::MOVING) => retained.unseen(),
+            _ => retained,
         }
+    }
+
+    pub(super) fn has(self, flag: u8) -> bool {
+        self.flags & flag != 0
+    }
+
+    /// The users for whom turns have been lost.
+    pub(super) fn lost(self) -> u8 {
+        self.users & ALL
+    }
+
+    /// The users whose position is not known.
+    pub(super) fn unknown(self) -> u8 {
+        self.users >> 4 | self.lost()
+    }
+
+    pub(super) fn lose(&mut self) {
+        self.users |= ALL;
+    }
+
+    pub(super) fn doubt(&mut self) {
+        self.users |= ALL << 4;
     }
 
     /// After a movement that nobody has seen.
     pub(super) fn unseen(self) -> Trust {
-        Trust { lost: ALL, doubted: ALL, ..self }
-    }
-
-    /// The stored form.
-    pub(super) fn to_bytes(self) -> [u8; 2] {
-        let Trust { referenced, lost, doubted, moving } = self;
-        [(lost & ALL) | doubted << 4, u8::from(referenced) | u8::from(moving) << 1]
-    }
-
-    pub(super) fn from_bytes([users, flags]: [u8; 2]) -> Trust {
-        let (referenced, moving) = (flags & 1 != 0, flags & 2 != 0);
-        Trust { referenced, lost: users & ALL, doubted: users >> 4, moving }
+        Trust { users: u8::MAX, ..self }
     }
 }
 
@@ -103,10 +114,10 @@ impl Trust {
 const ACCELERATION: u32 = 32;
 
 /// Steps by which a sensor can be away from where an even movement would have brought it in `millis`.
-pub(super) fn deviation(fastest: u32, millis: u32) -> u64 {
-    let change = u64::from((fastest / ACCELERATION).max(1));
-    let millis = u64::from(millis.min(0xFFFF));
-    (change * millis * (millis + 1) / 2).min(2 * u64::from(fastest) * millis)
+pub(super) fn deviation(fastest: u32, millis: u32) -> u32 {
+    let millis = millis.min(0xFFFF);
+    let change = (fastest / ACCELERATION).max(1);
+    change.saturating_mul(millis * (millis + 1) / 2).min(fastest.saturating_mul(2 * millis))
 }
 
 /// Milliseconds without a movement after which a shaft is at rest.
@@ -161,24 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn trust_that_is_stored_comes_back() {
-        for bits in 0..=u8::MAX {
-            for flags in 0..4 {
-                let trust = Trust::from_bytes([bits, flags]);
-                assert_eq!(trust.to_bytes(), [bits, flags]);
-            }
-        }
-    }
-
-    #[test]
     fn a_movement_that_nobody_saw_counts_where_the_reading_is_not_enough() {
-        let turning = Trust { moving: true, ..Trust::default() };
+        let turning = Trust { users: 0, flags: Trust::MOVING };
         for (basis, is_lost) in
             [(Basis::Code, false), (Basis::LongCode, false), (Basis::ShortCode, true), (Basis::Count, true)]
         {
-            assert_eq!(Trust::at_start(Some(turning), basis).lost != 0, is_lost, "{basis:?}");
-            assert_eq!(Trust::at_start(Some(Trust::default()), basis).lost, 0, "{basis:?} at rest");
-            assert_eq!(Trust::at_start(None, basis).lost != 0, basis != Basis::Code, "{basis:?}");
+            assert_eq!(Trust::at_start(turning, basis).lost() != 0, is_lost, "{basis:?}");
+            assert_eq!(Trust::at_start(Trust::default(), basis).lost(), 0, "{basis:?} at rest");
+            assert_eq!(Trust::at_start(Trust::NONE, basis).lost() != 0, basis != Basis::Code, "{basis:?}");
         }
     }
 
@@ -190,6 +191,6 @@ mod tests {
             1640 * 2000,
             "from the fastest one way to the fastest the other way"
         );
-        assert_eq!(deviation(u32::MAX, u32::MAX), 2 * 0xFFFF * 0xFFFF_FFFF);
+        assert_eq!(deviation(u32::MAX, u32::MAX), u32::MAX);
     }
 }

@@ -158,30 +158,34 @@ impl Parameters {
     /// The parameters for the encoder: both channels count travel.
     #[inline(never)]
     fn encoder(&self) -> encoder::Parameters {
-        let [first, second] = self.sensors.channels;
-        let channel = |own: ChannelParameters, source: Source| {
-            let users = self.units.map(|unit| unit.source == Some(source));
-            let bit = |mask: u8, is_user| mask >> 1 | if is_user { 1 << (UNITS - 1) } else { 0 };
-            let count = |unit: UnitParameters| {
-                if unit.source == Some(source) && unit.references != NO_OFFSET { unit.references } else { 0 }
-            };
-            ChannelParameters {
-                kind: own.kind,
-                resolution: own.resolution,
-                counted: own.counted,
-                fastest: own.fastest,
-                users: users.into_iter().fold(0, bit),
-                references: self.units.map(count),
-                ..ChannelParameters::default()
-            }
+        let channel = |own: ChannelParameters| ChannelParameters {
+            kind: own.kind,
+            resolution: own.resolution,
+            counted: own.counted,
+            fastest: own.fastest,
+            users: 0,
+            ..ChannelParameters::default()
         };
+        let mut channels = self.sensors.channels.map(channel);
+        let [first, second] = &mut channels;
+        for (number, unit) in self.units.iter().enumerate() {
+            let channel = match unit.source {
+                None => continue,
+                Some(Source::First) => &mut *first,
+                Some(Source::Second) => &mut *second,
+            };
+            channel.users |= 1 << number;
+            if let Some(references) = channel.references.get_mut(number) {
+                *references = if unit.references == NO_OFFSET { 0 } else { unit.references };
+            }
+        }
         encoder::Parameters {
             operating: 0,
             travel: Some(self.travel),
             // Steps in nm and in 0.01 mm/s.
             step: u32::from(self.position_step.get()) * 10_000,
             speed_step: u32::from(self.speed_step.get()) * 10,
-            channels: [channel(first, Source::First), channel(second, Source::Second)],
+            channels,
             module: Module::default(),
             ..self.sensors
         }

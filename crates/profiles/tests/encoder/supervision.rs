@@ -274,10 +274,8 @@ fn missed_readings_lose_no_turn_while_the_way_is_certain() {
             total += 1365 * (missed + 1);
             let values = bench.go(total).channels[0];
             let range = 4096 * 8192;
-            assert_eq!(
-                i64::from(values.position) == total.rem_euclid(range) && values.sensor_state == 0,
-                is_known
-            );
+            let is_right = i64::from(values.position) == total.rem_euclid(range);
+            assert!(is_right || !is_known, "{missed} at {fastest}: {values:?} and not {total}");
             assert_eq!(values.sensor_state & SENSOR_POSITION_ERROR != 0, !is_known, "{missed} at {fastest}");
         }
     }

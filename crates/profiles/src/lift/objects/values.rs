@@ -84,6 +84,7 @@ impl UnitFields {
     }
 
     /// The offset has lost its meaning. A unit that has never been preset has none.
+    #[inline(never)]
     pub(super) fn drop_offset(&self, image: &mut [u8]) {
         self.offset.store(image, [0; 4]);
         if self.references.u8(image) != 0 {
