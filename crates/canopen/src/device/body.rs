@@ -17,6 +17,8 @@ pub trait Body: Sized {
     /// The memory of all values.
     type Image;
 
+    /// Whether the device has PDOs.
+    const HAS_PDOS: bool = false;
     /// Free places in the transmit queue that a block upload leaves: for a heartbeat and an LSS response.
     const RESERVED_ROOM: usize = 2;
 

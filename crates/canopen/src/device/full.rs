@@ -62,6 +62,7 @@ impl<
     type Application = A;
     type Image = [u8; N];
 
+    const HAS_PDOS: bool = true;
     /// Free places for all PDOs of a SYNC, a heartbeat and an EMCY.
     const RESERVED_ROOM: usize = 10;
 

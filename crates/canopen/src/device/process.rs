@@ -43,7 +43,7 @@ impl<B: Body> Node<B> {
         if is_nmt {
             self.on_nmt(frame);
         }
-        let context = &mut self.services.process_context(now, out);
+        let context = &mut self.services.process_context(B::HAS_PDOS, now, out);
         if !is_nmt && self.body.basic().state.has_pdos() {
             self.body.on_pdo_frame(frame, context);
         }
@@ -62,7 +62,7 @@ impl<B: Body> Node<B> {
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.body.basic().process_due {
-            let context = &mut self.services.process_context(now, out);
+            let context = &mut self.services.process_context(B::HAS_PDOS, now, out);
             self.body.send_process(context);
         }
         self.process_next()
@@ -95,7 +95,7 @@ impl<
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
-        let context = &mut self.services.process_context(now, out);
+        let context = &mut self.services.process_context(true, now, out);
         let place = self.body.tpdo_place(tpdo);
         if self.body.basic.state.has_pdos()
             && let Some(tpdo) = place.and_then(|place| self.body.tpdos.get_mut(usize::from(place)))
@@ -108,7 +108,7 @@ impl<
     }
 
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
-        let context = &mut self.services.process_context(now, out);
+        let context = &mut self.services.process_context(true, now, out);
         self.body.self_start(context);
         if self.body.basic.state.has_pdos() {
             self.body.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));

@@ -78,13 +78,16 @@ impl Services {
         Context { now, out, is_open: !self.lss.is_switching() }
     }
 
-    /// The same for process data, which have a share of the bus.
+    /// The same for process data, which have a share of the bus. `has_pdos`: whether the device has PDOs at all.
     pub(super) fn process_context<'a, Q: Transmit>(
         &'a mut self,
+        has_pdos: bool,
         now: Instant,
         out: &'a mut Q,
     ) -> ProcessContext<'a, Q> {
-        self.budget.begin(now, || out.has_waiting_pdo());
+        if has_pdos {
+            self.budget.begin(now, || out.has_waiting_pdo());
+        }
         ProcessContext { now, out, is_open: !self.lss.is_switching(), budget: &mut self.budget }
     }
 }
