@@ -118,7 +118,7 @@ impl Input {
             step: 0,
             implausible: None,
             gap: 0,
-            rest: Rest::default(),
+            rest: Rest::new(is_same && retained.trust.has(Trust::MOVING)),
             young: if is_same && matches!(basis, Basis::ShortCode | Basis::Count) { YOUNG } else { 0 },
         }
     }

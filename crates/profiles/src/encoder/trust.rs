@@ -124,13 +124,18 @@ pub(super) fn deviation(fastest: u32, millis: u32) -> u32 {
 const REST_MILLIS: u8 = 100;
 
 /// Whether a shaft is at rest. A shaft that dithers between two steps is.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Rest {
     anchor: u32,
     millis: u8,
 }
 
 impl Rest {
+    /// At a start. A shaft that was at rest before still is, unless it moves.
+    pub(super) fn new(is_moving: bool) -> Rest {
+        Rest { anchor: 0, millis: if is_moving { 0 } else { REST_MILLIS } }
+    }
+
     /// Takes the movement up to now, modulo 2^32; returns whether the shaft has left its place.
     #[inline]
     pub(super) fn follow(&mut self, count: u32) -> bool {
@@ -159,7 +164,8 @@ mod tests {
 
     #[test]
     fn a_shaft_is_at_rest_after_a_tenth_of_a_second_and_while_it_dithers() {
-        let mut rest = Rest::default();
+        assert!(!Rest::new(false).is_moving());
+        let mut rest = Rest::new(true);
         (0..99).for_each(|n| assert!(!rest.follow(n % 2) && rest.is_moving()));
         rest.follow(0);
         assert!(!rest.is_moving());

@@ -260,3 +260,18 @@ fn words_of_an_older_layout_are_a_lost_position() {
     let values = Bench::started(one(SensorType::IncrementalCounted), start, 0).first();
     assert_ne!(values.sensor_state & SENSOR_POSITION_ERROR, 0);
 }
+
+/// The power fails again and again while the node starts.
+#[test]
+fn a_shaft_at_rest_keeps_its_position_through_starts_that_are_cut_short() {
+    for kind in [SensorType::IncrementalCounted, SensorType::SingleTurnCounted] {
+        let mut bench = Bench::new(one(kind));
+        (0..=20).for_each(|turns| _ = bench.go(turns * 500));
+        bench.rest();
+        for millis in [1, 5, 50] {
+            bench = after_power_loss(&bench, 10_000);
+            (0..millis).for_each(|_| assert_eq!(bench.first().sensor_state & SENSOR_POSITION_ERROR, 0));
+        }
+        assert_eq!(bench.first().position, 10_000);
+    }
+}

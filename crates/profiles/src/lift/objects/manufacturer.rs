@@ -81,11 +81,12 @@ pub(super) const OBJECTS: &[Object] = &[
     // the COB-IDs themselves.
     Object::new(SWITCHED_OFF, 0, "TPDOs switched off by a client", Type::Unsigned8, Access::ReadOnly)
         .stored(Group::Communication),
-    Object::highest(0x2310, 2, "Load filter"),
+    Object::highest(0x2310, 3, "Load filter"),
     // Codes as in 61A0h and 61A1h of CiA 404.
-    parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),
+    parameter(0x2310, 1, "Load filter type", Type::Unsigned8).limits(0, 2).value(2),
     parameter(0x2310, 2, "Load filter constant", Type::Unsigned8).limits(1, 255).value(100),
-    // Two equal pressures switch the load measuring unit off.
+    parameter(0x2310, 3, "Load hysteresis", Type::Unsigned16).value(10).unit("kg"),
+    // With two equal pressures no load is measured, as with a broken sensor.
     Object::highest(0x2311, 4, "Load calibration"),
     parameter(0x2311, 1, "Pressure at point 1", Type::Real32).unit("Pa"),
     parameter(0x2311, 2, "Load at point 1", Type::Real32).unit("kg"),

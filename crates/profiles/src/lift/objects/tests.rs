@@ -277,7 +277,7 @@ fn what_is_not_weighed_is_no_reference() {
     assert_eq!(node.write(0x6486, 0, 0), Err(Abort::DeviceState));
     node.write_real(0x2311, 3, 0.0);
     node.sample();
-    assert_eq!((node.read(0x6480, 1), node.read(0x2313, 2)), (0, 0), "no load measuring unit");
+    assert_eq!((node.read(0x6480, 1), node.read(0x2313, 2)), (0xFFFF, 1), "no characteristic");
     assert_eq!(node.write(0x6486, 0, 0), Err(Abort::DeviceState));
 }
 

@@ -28,6 +28,7 @@ pub struct Fields {
     limits: [Field; 4],
     filter_type: Field,
     filter_constant: Field,
+    hysteresis: Field,
     points: [[Field; 2]; 2],
     pub(super) load_offset: Field,
     pub(super) measured_load: Field,
@@ -129,6 +130,7 @@ impl Fields {
             limits: [d.field(0x6483, 1), d.field(0x6483, 2), d.field(0x6483, 3), d.field(0x6483, 4)],
             filter_type: d.field(0x2310, 1),
             filter_constant: d.field(0x2310, 2),
+            hysteresis: d.field(0x2310, 3),
             points: [pair(d, 0x2311, 1), pair(d, 0x2311, 3)],
             load_offset: d.field(0x2312, 0),
             measured_load: d.field(0x2313, 1),
@@ -183,6 +185,7 @@ impl Fields {
             points: self.points.map(point),
             offset: self.load_offset.f32(image),
             limits: self.limits.map(|at| at.u16(image)),
+            hysteresis: self.hysteresis.u16(image),
         }
     }
 
