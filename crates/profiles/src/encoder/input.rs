@@ -234,7 +234,10 @@ impl Input {
                 RetainedChannel { kind, resolution, total, trust }
             }
             None if self.last.kind != 0 => self.last,
-            None => RetainedChannel { trust, ..RetainedChannel::default() },
+            None => {
+                trust.flags &= Trust::NEEDS_MEMORY;
+                RetainedChannel { trust, ..RetainedChannel::default() }
+            }
         }
     }
 
