@@ -2,7 +2,8 @@
 
 /// One cam of one channel.
 ///
-/// A cam goes on from the low to the high limit, both included. It stays on until the position is further outside than
+/// A cam goes on from the low to the high limit, both included. A limit below zero is a position at the end of the
+/// range, so a window can go across zero. It stays on until the position is further outside than
 /// the hysteresis. Limits in the wrong order are swapped (CiA 406 is silent about them).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cam {
@@ -25,26 +26,26 @@ pub struct Cams {
     pub polarity: u8,
 }
 
-/// An interval of positions.
+/// An interval of positions, which repeat after the range: limits below zero are positions at the end of the range.
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
-    low: u32,
+    low: i64,
     /// Highest position minus lowest position.
-    length: u32,
+    length: i64,
 }
 
 impl Window {
-    /// The interval of the cam, with `margin` added on both sides. The limits are signed and the position is not, so
-    /// the part below zero is cut off. `None` when nothing remains.
-    fn new(cam: &Cam, margin: u16) -> Option<Window> {
-        let low = i64::from(cam.low.min(cam.high)) - i64::from(margin);
-        let high = i64::from(cam.low.max(cam.high)) + i64::from(margin);
-        let (low, high) = (u32::try_from(low.max(0)).ok()?, u32::try_from(high).ok()?);
-        Some(Window { low, length: high - low })
+    /// The interval of the cam, with `margin` added on both sides.
+    fn new(cam: &Cam, margin: u16) -> Window {
+        let (low, high) = (i64::from(cam.low.min(cam.high)), i64::from(cam.low.max(cam.high)));
+        Window { low: low - i64::from(margin), length: high - low + 2 * i64::from(margin) }
     }
 
-    fn contains(self, position: u32) -> bool {
-        position.wrapping_sub(self.low) <= self.length
+    fn contains(self, position: i64, range: i64) -> bool {
+        let above = position - self.low;
+        let is_inside = |above: i64| (0..=self.length).contains(&above);
+        // A window that begins beyond the range contains no position.
+        is_inside(above) || is_inside(above - range) || (self.low < range && is_inside(above + range))
     }
 }
 
@@ -53,8 +54,6 @@ impl Window {
 pub struct CamChannel {
     enable: u8,
     polarity: u8,
-    /// Bits of the cams whose limits some position can reach.
-    reachable: u8,
     /// For each cam: the window in which the cam goes on, and the window in which the cam stays on.
     windows: [[Window; 2]; 8],
     active: u8,
@@ -63,25 +62,26 @@ pub struct CamChannel {
 impl CamChannel {
     /// Takes over parameters.
     pub fn apply(&mut self, cams: &Cams) {
-        (self.enable, self.polarity, self.reachable) = (cams.enable, cams.polarity, 0);
-        for ((cam, windows), bit) in cams.cams.iter().zip(&mut self.windows).zip(BITS) {
-            let [on, stay] = [0, cam.hysteresis].map(|margin| Window::new(cam, margin));
-            self.reachable |= if on.is_some() { bit } else { 0 };
-            *windows = [on.unwrap_or_default(), stay.unwrap_or_default()];
+        (self.enable, self.polarity) = (cams.enable, cams.polarity);
+        for (cam, windows) in cams.cams.iter().zip(&mut self.windows) {
+            *windows = [0, cam.hysteresis].map(|margin| Window::new(cam, margin));
         }
     }
 
-    /// The cam state register (6300h) at `position`. A disabled cam reads 0 whatever its polarity: 6301h says that its
-    /// calculation is off and its state permanently 0. A disabled cam also forgets its state, so after enabling, the
-    /// limits alone decide.
-    pub fn update(&mut self, position: u32) -> u8 {
+    /// The cam state register (6300h) at `position`, which repeats after `range`. A disabled cam reads 0 whatever its
+    /// polarity: 6301h says that its calculation is off and its state permanently 0. A disabled cam also forgets its
+    /// state, so after enabling, the limits alone decide.
+    pub fn update(&mut self, position: u32, range: i64) -> u8 {
         let mut active = 0;
         for ([on, stay], bit) in self.windows.iter().zip(BITS) {
+            if self.enable & bit == 0 {
+                continue;
+            }
             let window = if self.active & bit == 0 { on } else { stay };
-            active |= if window.contains(position) { bit } else { 0 };
+            active |= if window.contains(position.into(), range) { bit } else { 0 };
         }
-        self.active = active & self.enable & self.reachable;
-        (self.active ^ self.polarity) & self.enable
+        self.active = active;
+        (active ^ self.polarity) & self.enable
     }
 }
 
@@ -117,16 +117,21 @@ mod tests {
         }
     }
 
+    const WHOLE: i64 = 1 << 32;
+
     /// The same rule, step by step: a cam goes on inside its window and goes off beyond the margin.
-    fn walk(cam: Cam, positions: &[u32]) -> Vec<bool> {
+    fn walk(cam: Cam, positions: &[u32], range: i64) -> Vec<bool> {
         let (low, high) = (i64::from(cam.low.min(cam.high)), i64::from(cam.low.max(cam.high)));
         let margin = i64::from(cam.hysteresis);
         let mut on = false;
         let mut states = Vec::new();
         for position in positions.iter().map(|p| i64::from(*p)) {
-            if position >= low && position <= high {
+            let seen = [position, position - range, position + range];
+            let seen = &seen[..if low - margin < range { 3 } else { 2 }];
+            let on_seen = &seen[..if low < range { seen.len() } else { 2 }];
+            if on_seen.iter().any(|p| (low..=high).contains(p)) {
                 on = true;
-            } else if position < low - margin || position > high + margin {
+            } else if !seen.iter().any(|p| (low - margin..=high + margin).contains(p)) {
                 on = false;
             }
             states.push(on);
@@ -142,10 +147,10 @@ mod tests {
         ) {
             let mut channel = CamChannel::default();
             channel.apply(&Cams { cams, enable, polarity });
-            let walks = cams.map(|cam| walk(cam, &positions));
+            let walks = cams.map(|cam| walk(cam, &positions, WHOLE));
             for (i, position) in positions.into_iter().enumerate() {
                 let active = walks.iter().zip(BITS).map(|(walk, bit)| if walk[i] { bit } else { 0 }).sum::<u8>();
-                prop_assert_eq!(channel.update(position), (active ^ polarity) & enable);
+                prop_assert_eq!(channel.update(position, WHOLE), (active ^ polarity) & enable);
             }
         }
     }
@@ -153,7 +158,7 @@ mod tests {
     #[test]
     fn a_disabled_cam_reads_zero_even_with_inverted_polarity() {
         let cam = Cam { low: 0, high: 100, hysteresis: 0 };
-        assert_eq!(channel(cam, 0, 0xFF).update(50), 0);
+        assert_eq!(channel(cam, 0, 0xFF).update(50, WHOLE), 0);
     }
 
     #[test]
@@ -161,12 +166,41 @@ mod tests {
         let cam = Cam { low: 10, high: 20, hysteresis: 5 };
         let cams = |enable| Cams { cams: [cam; 8], enable, polarity: 0 };
         let mut channel = channel(cam, 1, 0);
-        assert_eq!(channel.update(20), 1);
+        assert_eq!(channel.update(20, WHOLE), 1);
         channel.apply(&cams(1));
-        assert_eq!(channel.update(25), 1);
+        assert_eq!(channel.update(25, WHOLE), 1);
         channel.apply(&cams(0));
-        assert_eq!(channel.update(25), 0);
+        assert_eq!(channel.update(25, WHOLE), 0);
         channel.apply(&cams(1));
-        assert_eq!(channel.update(25), 0);
+        assert_eq!(channel.update(25, WHOLE), 0);
+    }
+
+    /// 19 changes in a dither over zero, with a hysteresis of 10 (E30).
+    #[test]
+    fn hysteresis_and_windows_go_across_zero() {
+        let range = 36_000;
+        let states = |cam: Cam, positions: &[u32]| {
+            let mut channel = channel(cam, 1, 0);
+            positions.iter().map(|position| channel.update(*position, range)).collect::<Vec<u8>>()
+        };
+        let dither: Vec<u32> = (0..20).map(|n| if n % 2 == 0 { 3 } else { 35_995 }).collect();
+        assert_eq!(states(Cam { low: 0, high: 100, hysteresis: 10 }, &dither), [1; 20]);
+        assert_eq!(states(Cam { low: 35_900, high: 35_999, hysteresis: 10 }, &dither)[1..], [1; 19]);
+        let across =
+            [35_899, 35_900, 35_999, 0, 100, 101].map(|at| (at, u8::from(at != 35_899 && at != 101)));
+        for (low, high) in [(-100, 100), (35_900, 36_100)] {
+            for (at, state) in across {
+                assert_eq!(
+                    states(Cam { low, high, hysteresis: 0 }, &[at]),
+                    [state],
+                    "{low} to {high} at {at}"
+                );
+            }
+        }
+        assert_eq!(
+            states(Cam { low: 36_000, high: 36_100, hysteresis: 0 }, &[0, 50]),
+            [0, 0],
+            "beyond the range"
+        );
     }
 }

@@ -165,11 +165,13 @@ impl Channel {
         }
         let position = self.position.value(tracker.shaft());
         let speed = self.speedometer.update(tracker.count());
+        // At most 2^32.
+        let range = self.position.scale().range().get().cast_signed();
         ChannelValues {
             position,
             speed: speed_value(speed, self.speed_factor),
-            cams: self.cams.update(position),
-            area: area_state(&self.area, &self.module, position, self.input.native()),
+            cams: self.cams.update(position, range),
+            area: area_state(&self.area, &self.module, position, range, self.input.native()),
             offset: self.position.offset(),
             reading: self.reading(position),
             ..fixed

@@ -283,7 +283,8 @@ impl Unit {
             position,
             reading: if channel.reading == channel.position { position } else { at(channel.reading) },
             speed: if self.is_inverted { channel.speed.saturating_neg() } else { channel.speed },
-            state: area_state(&self.limits, &Module::default(), position, 0) | self.known(channel),
+            state: area_state(&self.limits, &Module::default(), position, self.range, 0)
+                | self.known(channel),
             warnings,
             ..self.fixed
         }
