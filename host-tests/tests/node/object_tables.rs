@@ -9,7 +9,6 @@ use host_tests::lift417;
 use host_tests::tables::{Row, table};
 use node::Personality;
 
-const ACCESS: u32 = 0x0601_0000;
 const NOT_MAPPABLE: u32 = 0x0604_0041;
 const WRITE_ONLY: u32 = 0x0601_0001;
 const READ_ONLY: u32 = 0x0601_0002;
