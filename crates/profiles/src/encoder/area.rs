@@ -41,7 +41,8 @@ impl Default for Module {
 /// so both are compared in 64 bits. A limit at either end of INTEGER32 counts as no limit.
 #[must_use]
 pub fn area_state(area: &Area, module: &Module, position: u32, range: i64, native: i64) -> u8 {
-    let position = seen_from(area, position.into(), range);
+    let position = i64::from(position);
+    let position = if area.low < 0 { seen_from(area, position, range) } else { position };
     let is_low = module.low > i32::MIN && native <= module.low.into();
     let is_high = module.high < i32::MAX && native >= module.high.into();
     let bit = |set: bool, mask: u8| if set { mask } else { 0 };
@@ -51,14 +52,11 @@ pub fn area_state(area: &Area, module: &Module, position: u32, range: i64, nativ
 }
 
 /// The position below zero of which this one is the same, where that is nearer to a work area that begins below zero.
+#[inline(never)]
 fn seen_from(area: &Area, position: i64, range: i64) -> i64 {
     let (low, high) = (i64::from(area.low), i64::from(area.high));
     let below = position - range;
-    if low < 0 && position > high && (below >= low || low - below < position - high) {
-        below
-    } else {
-        position
-    }
+    if position > high && (below >= low || low - below < position - high) { below } else { position }
 }
 
 #[cfg(test)]

@@ -29,23 +29,28 @@ pub struct Cams {
 /// An interval of positions, which repeat after the range: limits below zero are positions at the end of the range.
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
-    low: i64,
+    low: u32,
     /// Highest position minus lowest position.
-    length: i64,
+    length: u32,
 }
 
 impl Window {
     /// The interval of the cam, with `margin` added on both sides.
-    fn new(cam: &Cam, margin: u16) -> Window {
-        let (low, high) = (i64::from(cam.low.min(cam.high)), i64::from(cam.low.max(cam.high)));
-        Window { low: low - i64::from(margin), length: high - low + 2 * i64::from(margin) }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Both are below the range, at most 2^32.
+    #[inline(never)]
+    fn new(cam: &Cam, margin: u16, range: i64) -> Window {
+        let low = i64::from(cam.low.min(cam.high)) - i64::from(margin);
+        let high = i64::from(cam.low.max(cam.high)) + i64::from(margin);
+        let low_in_range = low.checked_rem_euclid(range).unwrap_or(0);
+        Window { low: low_in_range as u32, length: (high - low).min(range - 1) as u32 }
     }
 
-    fn contains(self, position: i64, range: i64) -> bool {
-        let above = position - self.low;
-        let is_inside = |above: i64| (0..=self.length).contains(&above);
-        // A window that begins beyond the range contains no position.
-        is_inside(above) || is_inside(above - range) || (self.low < range && is_inside(above + range))
+    /// `range` modulo 2^32.
+    #[inline]
+    fn contains(self, position: u32, range: u32) -> bool {
+        let above = position.wrapping_sub(self.low);
+        let above = if position < self.low { above.wrapping_add(range) } else { above };
+        above <= self.length
     }
 }
 
@@ -54,34 +59,38 @@ impl Window {
 pub struct CamChannel {
     enable: u8,
     polarity: u8,
+    /// The range of the positions, modulo 2^32.
+    range: u32,
+    /// Bits of the cams that begin within the range.
+    reachable: u8,
     /// For each cam: the window in which the cam goes on, and the window in which the cam stays on.
     windows: [[Window; 2]; 8],
     active: u8,
 }
 
 impl CamChannel {
-    /// Takes over parameters.
-    pub fn apply(&mut self, cams: &Cams) {
-        (self.enable, self.polarity) = (cams.enable, cams.polarity);
-        for (cam, windows) in cams.cams.iter().zip(&mut self.windows) {
-            *windows = [0, cam.hysteresis].map(|margin| Window::new(cam, margin));
+    /// Takes over parameters. Positions repeat after `range`, at most 2^32.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn apply(&mut self, cams: &Cams, range: i64) {
+        (self.enable, self.polarity, self.reachable) = (cams.enable, cams.polarity, 0);
+        self.range = range as u32;
+        for ((cam, windows), bit) in cams.cams.iter().zip(&mut self.windows).zip(BITS) {
+            *windows = [0, cam.hysteresis].map(|margin| Window::new(cam, margin, range));
+            self.reachable |= if i64::from(cam.low.min(cam.high)) < range { bit } else { 0 };
         }
     }
 
-    /// The cam state register (6300h) at `position`, which repeats after `range`. A disabled cam reads 0 whatever its
-    /// polarity: 6301h says that its calculation is off and its state permanently 0. A disabled cam also forgets its
-    /// state, so after enabling, the limits alone decide.
-    pub fn update(&mut self, position: u32, range: i64) -> u8 {
+    /// The cam state register (6300h) at `position`. A disabled cam reads 0 whatever its polarity: 6301h says that its
+    /// calculation is off and its state permanently 0. A disabled cam also forgets its state, so after enabling, the
+    /// limits alone decide.
+    pub fn update(&mut self, position: u32) -> u8 {
         let mut active = 0;
         for ([on, stay], bit) in self.windows.iter().zip(BITS) {
-            if self.enable & bit == 0 {
-                continue;
-            }
             let window = if self.active & bit == 0 { on } else { stay };
-            active |= if window.contains(position.into(), range) { bit } else { 0 };
+            active |= if window.contains(position, self.range) { bit } else { 0 };
         }
-        self.active = active;
-        (active ^ self.polarity) & self.enable
+        self.active = active & self.enable & self.reachable;
+        (self.active ^ self.polarity) & self.enable
     }
 }
 
@@ -95,7 +104,7 @@ mod tests {
 
     fn channel(cam: Cam, enable: u8, polarity: u8) -> CamChannel {
         let mut channel = CamChannel::default();
-        channel.apply(&Cams { cams: [cam; 8], enable, polarity });
+        channel.apply(&Cams { cams: [cam; 8], enable, polarity }, WHOLE);
         channel
     }
 
@@ -146,11 +155,11 @@ mod tests {
             positions in prop::collection::vec(any_position(), 1..60),
         ) {
             let mut channel = CamChannel::default();
-            channel.apply(&Cams { cams, enable, polarity });
+            channel.apply(&Cams { cams, enable, polarity }, WHOLE);
             let walks = cams.map(|cam| walk(cam, &positions, WHOLE));
             for (i, position) in positions.into_iter().enumerate() {
                 let active = walks.iter().zip(BITS).map(|(walk, bit)| if walk[i] { bit } else { 0 }).sum::<u8>();
-                prop_assert_eq!(channel.update(position, WHOLE), (active ^ polarity) & enable);
+                prop_assert_eq!(channel.update(position), (active ^ polarity) & enable);
             }
         }
     }
@@ -158,7 +167,7 @@ mod tests {
     #[test]
     fn a_disabled_cam_reads_zero_even_with_inverted_polarity() {
         let cam = Cam { low: 0, high: 100, hysteresis: 0 };
-        assert_eq!(channel(cam, 0, 0xFF).update(50, WHOLE), 0);
+        assert_eq!(channel(cam, 0, 0xFF).update(50), 0);
     }
 
     #[test]
@@ -166,13 +175,13 @@ mod tests {
         let cam = Cam { low: 10, high: 20, hysteresis: 5 };
         let cams = |enable| Cams { cams: [cam; 8], enable, polarity: 0 };
         let mut channel = channel(cam, 1, 0);
-        assert_eq!(channel.update(20, WHOLE), 1);
-        channel.apply(&cams(1));
-        assert_eq!(channel.update(25, WHOLE), 1);
-        channel.apply(&cams(0));
-        assert_eq!(channel.update(25, WHOLE), 0);
-        channel.apply(&cams(1));
-        assert_eq!(channel.update(25, WHOLE), 0);
+        assert_eq!(channel.update(20), 1);
+        channel.apply(&cams(1), WHOLE);
+        assert_eq!(channel.update(25), 1);
+        channel.apply(&cams(0), WHOLE);
+        assert_eq!(channel.update(25), 0);
+        channel.apply(&cams(1), WHOLE);
+        assert_eq!(channel.update(25), 0);
     }
 
     /// 19 changes in a dither over zero, with a hysteresis of 10 (E30).
@@ -180,8 +189,9 @@ mod tests {
     fn hysteresis_and_windows_go_across_zero() {
         let range = 36_000;
         let states = |cam: Cam, positions: &[u32]| {
-            let mut channel = channel(cam, 1, 0);
-            positions.iter().map(|position| channel.update(*position, range)).collect::<Vec<u8>>()
+            let mut channel = CamChannel::default();
+            channel.apply(&Cams { cams: [cam; 8], enable: 1, polarity: 0 }, range);
+            positions.iter().map(|position| channel.update(*position)).collect::<Vec<u8>>()
         };
         let dither: Vec<u32> = (0..20).map(|n| if n % 2 == 0 { 3 } else { 35_995 }).collect();
         assert_eq!(states(Cam { low: 0, high: 100, hysteresis: 10 }, &dither), [1; 20]);

@@ -105,8 +105,10 @@ impl Encoder {
     pub(crate) fn retain_in(&self, words: &mut [u32; RETAINED_WORDS]) {
         let (places, rest) = words.as_chunks_mut::<{ RetainedChannel::WORDS }>();
         for ((place, channel), before) in places.iter_mut().zip(&self.channels).zip(&self.retained.channels) {
-            let retained = channel.as_ref().map_or(*before, Channel::retained);
-            *place = retained.to_words();
+            *place = match channel {
+                Some(channel) => channel.retained().to_words(),
+                None => before.to_words(),
+            };
         }
         rest.iter_mut().zip(self.retained.operating_time.to_words()).for_each(|(to, from)| *to = from);
     }

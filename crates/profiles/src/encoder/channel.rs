@@ -134,7 +134,7 @@ impl Channel {
     fn configure(&mut self, all: &Parameters, own: &ChannelParameters, scale: &Scale) {
         let factor = all.speed_factor(self.input.sensor());
         self.speed_factor = if scale.is_reversed() { -factor } else { factor };
-        self.cams.apply(&own.cams);
+        self.cams.apply(&own.cams, scale.range().get().cast_signed());
         (self.area, self.module) = (own.area, all.module);
         self.commissioning.set(all.operating & super::COMMISSIONING != 0);
     }
@@ -170,7 +170,7 @@ impl Channel {
         ChannelValues {
             position,
             speed: speed_value(speed, self.speed_factor),
-            cams: self.cams.update(position, range),
+            cams: self.cams.update(position),
             area: area_state(&self.area, &self.module, position, range, self.input.native()),
             offset: self.position.offset(),
             reading: self.reading(position),

@@ -70,7 +70,8 @@ pub(super) struct Input {
     reference: Reference,
     /// A long code has come near one of its ends: from then on only retained memory tells how often the code has
     /// wrapped.
-    needs_memory: bool,
+    /// [`Trust::NEEDS_MEMORY`] or 0.
+    needs_memory: u8,
     /// The counted position; `None` until the first good reading.
     tracker: Option<Tracker>,
     /// Milliseconds since the last good reading.
@@ -98,9 +99,10 @@ impl Input {
         let (basis, marks) = marks(&sensor, scale, users);
         let is_same = retained.is_of(sensor.kind, sensor.resolution());
         let is_forgotten = retained.kind == 0 && retained.trust.lost() != 0;
-        let needs_memory = retained.trust.has(Trust::NEEDS_MEMORY) && basis == Basis::LongCode;
+        let needs_memory =
+            if basis == Basis::LongCode { retained.trust.flags & Trust::NEEDS_MEMORY } else { 0 };
         let is_lost = if is_forgotten {
-            basis != Basis::LongCode || needs_memory
+            basis != Basis::LongCode || needs_memory != 0
         } else {
             retained.kind != 0 && !is_same && sensor.kind.is_counted()
         };
@@ -134,7 +136,9 @@ impl Input {
         let (basis, marks) = marks(&sensor, scale, users);
         self.basis = basis;
         self.reference.apply(marks);
-        self.needs_memory &= self.basis == Basis::LongCode;
+        if basis != Basis::LongCode {
+            self.needs_memory = 0;
+        }
         let moved = i64::from(offset) - i64::from(self.offset);
         self.offset = offset;
         if let Some(tracker) = &mut self.tracker {
@@ -154,8 +158,8 @@ impl Input {
         if let Some(tracker) = &mut self.tracker {
             tracker.correct(correction);
         }
-        if self.reference.unknown() == 0 {
-            self.needs_memory &= self.has_wrapped();
+        if self.reference.unknown() == 0 && !self.has_wrapped() {
+            self.needs_memory = 0;
         }
     }
 
@@ -220,25 +224,23 @@ impl Input {
     /// The state to be retained for the next start. While readings are rejected, the position counts as lost.
     #[inline]
     pub(super) fn retained(&self, resolution: u32) -> RetainedChannel {
+        let Some(tracker) = &self.tracker else { return self.unread() };
         let mut trust = self.reference.trust();
-        let flag = |is_set: bool, flag: u8| if is_set { flag } else { 0 };
-        trust.flags = trust.flags & Trust::REFERENCED
-            | flag(self.rest.is_moving(), Trust::MOVING)
-            | flag(self.needs_memory, Trust::NEEDS_MEMORY);
+        trust.flags |= self.needs_memory | if self.rest.is_moving() { Trust::MOVING } else { 0 };
         if self.implausible.is_some() {
             trust.lose();
         }
-        match &self.tracker {
-            Some(tracker) => {
-                let (kind, total) = (self.sensor.kind.code(), tracker.total());
-                RetainedChannel { kind, resolution, total, trust }
-            }
-            None if self.last.kind != 0 => self.last,
-            None => {
-                trust.flags &= Trust::NEEDS_MEMORY;
-                RetainedChannel { trust, ..RetainedChannel::default() }
-            }
+        RetainedChannel { kind: self.sensor.kind.code(), resolution, total: tracker.total(), trust }
+    }
+
+    /// The same before the first reading.
+    #[inline(never)]
+    fn unread(&self) -> RetainedChannel {
+        if self.last.kind != 0 {
+            return self.last;
         }
+        let trust = Trust { flags: self.needs_memory, ..self.reference.trust() };
+        RetainedChannel { trust, ..RetainedChannel::default() }
     }
 
     /// Takes a sample.
@@ -271,7 +273,7 @@ impl Input {
     }
 
     /// Milliseconds since the last reading that was accepted.
-    fn unread(&self) -> u32 {
+    fn millis(&self) -> u32 {
         let rejected = self.implausible.map_or(0, |implausible| implausible.millis());
         self.missed.max(rejected).saturating_add(1)
     }
@@ -291,7 +293,7 @@ impl Input {
         let even = if self.is_uncertain() || self.gap > 0 {
             0
         } else {
-            self.step.saturating_mul(self.unread().cast_signed())
+            self.step.saturating_mul(self.millis().cast_signed())
         };
         even.saturating_add(tracker.distance(word.wrapping_sub(even.cast_unsigned())))
     }
@@ -302,7 +304,7 @@ impl Input {
         let gap = if self.gap > 0 { GAP_MILLIS } else { 0 };
         // In a gap the time is not known, so the speed counts as uncertain too.
         let way = self.step.unsigned_abs().saturating_mul(gap);
-        let away = deviation(self.limit(), self.unread().saturating_add(gap)).saturating_add(way);
+        let away = deviation(self.limit(), self.millis().saturating_add(gap)).saturating_add(way);
         away >= 1 << (self.sensor.bits() - 1)
     }
 
@@ -326,7 +328,7 @@ impl Input {
     #[inline(never)]
     fn end_outage(&mut self) {
         // Cannot be zero.
-        self.step = self.step.checked_div(self.unread().cast_signed()).unwrap_or(0);
+        self.step = self.step.checked_div(self.millis().cast_signed()).unwrap_or(0);
         if self.basis.has_rounds() && self.is_uncertain() {
             self.reference.lose();
         }
@@ -383,10 +385,11 @@ impl Input {
     }
 
     fn note_edge(&mut self) {
-        if self.basis == Basis::LongCode && !self.needs_memory {
+        if self.basis == Basis::LongCode && self.needs_memory == 0 {
             let code = 1_i64 << self.sensor.bits();
             let total = self.tracker.as_ref().map_or(0, Tracker::total).wrapping_sub(self.offset.into());
-            self.needs_memory = total < code / EDGE || total >= code - code / EDGE;
+            let is_near = total < code / EDGE || total >= code - code / EDGE;
+            self.needs_memory = if is_near { Trust::NEEDS_MEMORY } else { 0 };
         }
     }
 

@@ -67,6 +67,7 @@ pub(super) struct Reference {
 
 impl Reference {
     pub(super) fn new(marks: Marks, trust: Trust) -> Reference {
+        let trust = Trust { flags: trust.flags & Trust::REFERENCED, ..trust };
         let mut new = Reference {
             marks,
             trust,
