@@ -39,6 +39,18 @@ pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
     [low(a) + high(c), high(a) + low(d), low(b) + high(d), high(b) + low(e), low(c) + high(e)]
 }
 
+/// The sum of the pressure input. An input that is at a rail at the last conversion has crossed to it in this
+/// millisecond: the sum is that of the rail, so that the mean of signal and rail is never taken for a signal.
+pub fn pressure(words: &[AtomicU32; WORDS], sum: u32) -> u32 {
+    // The last scan begins in the upper half of a word.
+    let [.., last, _, _] = words;
+    match last.load(Ordering::Relaxed) >> 16 {
+        0 => 0,
+        4095.. => (FULL_SCALE * SCANS) as u32,
+        _ => sum,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,5 +72,18 @@ mod tests {
     #[test]
     fn the_largest_sums_do_not_run_over() {
         assert_eq!(sums(&buffer(|_| 4095)), [16 * 4095; CHANNELS]);
+    }
+
+    /// The rail is reached at any conversion of the millisecond, and lasts.
+    #[test]
+    fn a_sample_that_crosses_to_a_rail_is_at_the_rail() {
+        for (rail, sum) in [(0, 0), (4095, 16 * 4095)] {
+            for first in 0..SCANS {
+                let words = buffer(|n| if n % CHANNELS == 0 && n / CHANNELS >= first { rail } else { 2000 });
+                assert_eq!(pressure(&words, sums(&words)[0]), sum, "{rail} from scan {first} on");
+            }
+        }
+        let words = buffer(|n| if n % CHANNELS == 0 { 1000 } else { 4095 });
+        assert_eq!(pressure(&words, sums(&words)[0]), 16_000, "other channels do not count");
     }
 }

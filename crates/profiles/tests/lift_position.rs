@@ -1,12 +1,14 @@
 //! Car position units: the travel of a car, measured by sensors of each kind.
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
 
-use profiles::board::{RawEncoder, SsiFrame};
+use profiles::board::{RawEncoder, Retained, SsiFrame};
 use std::num::{NonZeroU16, NonZeroU32};
 
-use profiles::encoder::{Area, Coding, Command, Format, OVERFLOW, SensorType, UNDERFLOW, WARNING_FREQUENCY};
+use profiles::encoder::{
+    Area, Coding, Command, Format, OVERFLOW, SensorType, Start, UNDERFLOW, WARNING_FREQUENCY,
+};
 use profiles::lift::position::{
-    INVERTED, Parameters, PositionUnits, Snapshot, Source, UNKNOWN, UnitParameters,
+    INVERTED, NO_OFFSET, NOT_REFERENCED, Parameters, PositionUnits, Snapshot, Source, UNKNOWN, UnitParameters,
 };
 
 /// Speed of the car in mm/ms.
@@ -189,10 +191,17 @@ fn the_other_direction_leaves_the_position_and_turns_the_speed() {
 
 #[test]
 fn units_of_one_sensor_have_their_own_zero_direction_and_limits() {
-    let mut parameters = with_sensor(SensorType::LinearIncremental, 100_000);
+    let mut parameters = with_sensor(SensorType::LinearIncrementalCounted, 100_000);
     let limits = Area { low: 500, high: 1500 };
-    let second = UnitParameters { source: Some(Source::First), operating: INVERTED, offset: 2000, limits };
+    let second = UnitParameters {
+        source: Some(Source::First),
+        operating: INVERTED,
+        offset: 2000,
+        limits,
+        references: 1,
+    };
     parameters.units[2] = second;
+    parameters.units[0].references = 1;
     let mut car = Car::new(parameters, 0.0);
     let states = [1600.0, 900.0, 400.0, 1.0].map(|way| {
         // Ten metres a second at most: a leap would be a fault of the sensor.
@@ -200,7 +209,7 @@ fn units_of_one_sensor_have_their_own_zero_direction_and_limits() {
             car.drive((way - car.way).clamp(-10.0, 10.0));
         }
         let [first, absent, third, other] = car.drive(way - car.way).units;
-        assert_eq!((absent, other), Default::default());
+        assert_eq!((absent.state, other.state), (UNKNOWN, UNKNOWN), "no sensor");
         assert_eq!(first.position + third.position, 2000);
         assert_eq!(first.state, 0);
         (third.position, third.state)
@@ -304,5 +313,58 @@ fn a_car_that_is_faster_than_its_sensor_is_a_warning() {
         let mut car = Car::new(parameters, 0.0);
         // The car travels 51.2 steps in a millisecond.
         assert_eq!(car.drive(FAST).units[0].warnings, warnings);
+    }
+}
+
+/// A preset of one unit says nothing about another one on the same sensor.
+#[test]
+fn a_preset_of_one_unit_does_not_vouch_for_another() {
+    let [pulley, ..] = sensors();
+    let mut parameters = pulley;
+    parameters.units[1].source = Some(Source::First);
+    let mut car = Car::new(parameters, 0.0);
+    let states = |car: &mut Car| car.drive(0.0).units.map(|unit| unit.state);
+    assert_eq!(states(&mut car), [NOT_REFERENCED, NOT_REFERENCED, UNKNOWN, UNKNOWN], "never preset");
+    let preset = |car: &mut Car, unit: usize, value| {
+        let position = car.drive(0.0).units[unit].reading;
+        let offset = car.parameters.preset(unit, position, value).unwrap();
+        let own = &mut car.parameters.units[unit];
+        (own.offset, own.references) = (offset, own.references + 1);
+        car.apply();
+    };
+    preset(&mut car, 0, 1000);
+    assert_eq!(states(&mut car)[..2], [0, NOT_REFERENCED]);
+    preset(&mut car, 1, 2000);
+    assert_eq!(states(&mut car)[..2], [0, 0]);
+    // The battery is empty, and the car has moved.
+    car.units = PositionUnits::new(Start::of(Retained::Nothing, Some([0; 2])));
+    car.apply();
+    assert_eq!(states(&mut car)[..2], [NOT_REFERENCED, NOT_REFERENCED]);
+    preset(&mut car, 0, 5000);
+    assert_eq!(states(&mut car)[..2], [0, NOT_REFERENCED]);
+    let conditions = |car: &mut Car| car.drive(0.0).conditions.position;
+    (0..200).for_each(|_| _ = conditions(&mut car));
+    assert!(conditions(&mut car), "EMCY as long as one of them is wrong");
+    // A reset keeps what is known of each.
+    (0..200).for_each(|_| _ = car.drive(0.0));
+    car.units = PositionUnits::new(Start::Retained(car.units.retained_state()));
+    car.apply();
+    assert_eq!(states(&mut car)[..2], [0, NOT_REFERENCED]);
+    preset(&mut car, 1, 7000);
+    assert_eq!(states(&mut car)[..2], [0, 0]);
+    (0..200).for_each(|_| _ = conditions(&mut car));
+    assert!(!conditions(&mut car));
+}
+
+#[test]
+fn an_offset_that_has_lost_its_meaning_needs_a_preset() {
+    for parameters in sensors() {
+        let mut car = Car::new(parameters, 0.0);
+        car.parameters.units[0].references = NO_OFFSET;
+        car.apply();
+        assert_eq!(car.drive(0.0).units[0].state, NOT_REFERENCED);
+        car.parameters.units[0].references = 1;
+        car.apply();
+        assert_eq!(car.drive(0.0).units[0].state, 0);
     }
 }

@@ -9,7 +9,6 @@ use host_tests::lift417;
 use host_tests::tables::{Row, table};
 use node::Personality;
 
-const ACCESS: u32 = 0x0601_0000;
 const NOT_MAPPABLE: u32 = 0x0604_0041;
 const WRITE_ONLY: u32 = 0x0601_0001;
 const READ_ONLY: u32 = 0x0601_0002;
@@ -89,13 +88,13 @@ fn writing_is_refused_or_taken_as_the_access_says() {
         };
         let expected = match (row.index, row.sub) {
             // Factory data are locked.
-            (0x2107, _) => Err(ACCESS),
+            (0x2107, _) => Err(DEVICE_STATE),
             // The calibration is locked until the key is written.
             (0x2200..=0x2202, _) => Err(DEVICE_STATE),
             // There is no second encoder.
             (0x6010, 2) => Err(DEVICE_STATE),
             // No value has been measured yet.
-            (0x6382, _) => Err(DEVICE_STATE),
+            (0x6382 | 0x6125 | 0x6925, _) => Err(DEVICE_STATE),
             // The program is not on trial.
             (0x2002, 2) => Err(DEVICE_STATE),
             // The bootloader has no key, so no response can be valid.

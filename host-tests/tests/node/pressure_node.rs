@@ -104,6 +104,19 @@ fn autozero_moves_the_offset_until_the_value_is_zero() {
     assert!(real(&mut bench, 0x6130, 2) > 20.0);
 }
 
+/// An absolute pressure in Pa does not fit INTEGER16, but the sensor is well.
+#[test]
+fn autozero_is_possible_though_an_integer_is_clipped() {
+    let mut bench = Bench::booted();
+    bench.write(0x6131, 1, &0x0022_0000_u32.to_le_bytes()).unwrap();
+    bench.sample(&raw(250_000.0, 298.15));
+    assert_eq!(bench.read(0x6150, 1).unwrap()[0] & 1, 1, "clipped");
+    assert_eq!(bench.write(0x6125, 1, b"zero"), Ok(()));
+    bench.sample(&raw(250_000.0, 298.15));
+    assert!(is_close(real(&mut bench, 0x6130, 1), 0.0, 0.1));
+    assert_eq!(bench.read(0x6150, 1).unwrap()[0] & 1, 0);
+}
+
 #[test]
 fn autozero_needs_a_valid_value() {
     let mut bench = Bench::booted();

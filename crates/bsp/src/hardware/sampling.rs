@@ -11,7 +11,7 @@ use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 use crate::boards::{BOARD, Chip};
 use crate::losses::{Event, Losses};
 pub(super) use crate::oversampling::SCANS;
-use crate::oversampling::{CHANNELS, WORDS, sums};
+use crate::oversampling::{self, CHANNELS, WORDS, sums};
 
 /// One scan: pressure, its supply, thermistor, temperature sensor, VREFINT.
 const SCAN: [Conversion; CHANNELS] = [
@@ -155,7 +155,10 @@ impl Sampling {
             (true, true) => (self.latest_of_two(), true),
         };
         let words = BUFFER.as_chunks().0.get(half)?;
-        Some(Sums { channels: sums(words), half, is_second })
+        let mut channels = sums(words);
+        let [pressure, ..] = &mut channels;
+        *pressure = oversampling::pressure(words, *pressure);
+        Some(Sums { channels, half, is_second })
     }
 
     /// Both halves are complete. The older one is being overwritten, so it is dropped.

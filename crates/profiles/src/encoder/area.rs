@@ -34,14 +34,15 @@ impl Default for Module {
     }
 }
 
-/// The area state register at a position value and a position in native steps.
+/// The area state register at a position value, which repeats after `range`, and a position in native steps.
 ///
 /// The limits of the work area are part of the work area: only positions beyond a limit are reported (CiA 406, 7.4.1).
 /// A limit of the manufacturer is reported as soon as the position reaches it. The limits are signed and 6004h is not,
 /// so both are compared in 64 bits. A limit at either end of INTEGER32 counts as no limit.
 #[must_use]
-pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u8 {
+pub fn area_state(area: &Area, module: &Module, position: u32, range: i64, native: i64) -> u8 {
     let position = i64::from(position);
+    let position = if area.low < 0 { seen_from(area, position, range) } else { position };
     let is_low = module.low > i32::MIN && native <= module.low.into();
     let is_high = module.high < i32::MAX && native >= module.high.into();
     let bit = |set: bool, mask: u8| if set { mask } else { 0 };
@@ -50,10 +51,19 @@ pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u
         | bit(position < area.low.into(), UNDERFLOW)
 }
 
+/// The position below zero of which this one is the same, where that is nearer to a work area that begins below zero.
+#[inline(never)]
+fn seen_from(area: &Area, position: i64, range: i64) -> i64 {
+    let (low, high) = (i64::from(area.low), i64::from(area.high));
+    let below = position - range;
+    if position > high && (below >= low || low - below < position - high) { below } else { position }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const WHOLE: i64 = 1 << 32;
     const AREA: Area = Area { low: 100, high: 200 };
 
     #[test]
@@ -71,20 +81,36 @@ mod tests {
             (150, i64::MIN, OUT_OF_RANGE),
             (u32::MAX, i64::MAX, OUT_OF_RANGE | OVERFLOW),
         ] {
-            assert_eq!(area_state(&AREA, &module, position, native), state, "at {position}, {native}");
+            assert_eq!(area_state(&AREA, &module, position, WHOLE, native), state, "at {position}, {native}");
         }
     }
 
     #[test]
     fn a_module_without_limits_is_never_out_of_range() {
         for native in [i64::MIN, 0, i64::MAX] {
-            assert_eq!(area_state(&AREA, &Module::default(), 150, native), 0);
+            assert_eq!(area_state(&AREA, &Module::default(), 150, WHOLE, native), 0);
         }
     }
 
     #[test]
     fn limits_in_the_wrong_order_are_both_exceeded_in_between() {
         let area = Area { low: 200, high: 100 };
-        assert_eq!(area_state(&area, &Module::default(), 150, 0), OVERFLOW | UNDERFLOW);
+        assert_eq!(area_state(&area, &Module::default(), 150, WHOLE, 0), OVERFLOW | UNDERFLOW);
+    }
+
+    #[test]
+    fn a_work_area_can_begin_below_zero() {
+        let (area, module) = (Area { low: -100, high: 200 }, Module::default());
+        for (position, state) in [
+            (0, 0),
+            (200, 0),
+            (201, OVERFLOW),
+            (18_000, OVERFLOW),
+            (19_000, UNDERFLOW),
+            (35_899, UNDERFLOW),
+            (35_900, 0),
+        ] {
+            assert_eq!(area_state(&area, &module, position, 36_000, 0), state, "{position}");
+        }
     }
 }

@@ -2,7 +2,8 @@
 
 /// One cam of one channel.
 ///
-/// A cam goes on from the low to the high limit, both included. It stays on until the position is further outside than
+/// A cam goes on from the low to the high limit, both included. A limit below zero is a position at the end of the
+/// range, so a window can go across zero. It stays on until the position is further outside than
 /// the hysteresis. Limits in the wrong order are swapped (CiA 406 is silent about them).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cam {
@@ -25,7 +26,7 @@ pub struct Cams {
     pub polarity: u8,
 }
 
-/// An interval of positions.
+/// An interval of positions, which repeat after the range: limits below zero are positions at the end of the range.
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
     low: u32,
@@ -34,17 +35,22 @@ struct Window {
 }
 
 impl Window {
-    /// The interval of the cam, with `margin` added on both sides. The limits are signed and the position is not, so
-    /// the part below zero is cut off. `None` when nothing remains.
-    fn new(cam: &Cam, margin: u16) -> Option<Window> {
+    /// The interval of the cam, with `margin` added on both sides.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Both are below the range, at most 2^32.
+    #[inline(never)]
+    fn new(cam: &Cam, margin: u16, range: i64) -> Window {
         let low = i64::from(cam.low.min(cam.high)) - i64::from(margin);
         let high = i64::from(cam.low.max(cam.high)) + i64::from(margin);
-        let (low, high) = (u32::try_from(low.max(0)).ok()?, u32::try_from(high).ok()?);
-        Some(Window { low, length: high - low })
+        let low_in_range = low.checked_rem_euclid(range).unwrap_or(0);
+        Window { low: low_in_range as u32, length: (high - low).min(range - 1) as u32 }
     }
 
-    fn contains(self, position: u32) -> bool {
-        position.wrapping_sub(self.low) <= self.length
+    /// `range` modulo 2^32.
+    #[inline]
+    fn contains(self, position: u32, range: u32) -> bool {
+        let above = position.wrapping_sub(self.low);
+        let above = if position < self.low { above.wrapping_add(range) } else { above };
+        above <= self.length
     }
 }
 
@@ -53,7 +59,9 @@ impl Window {
 pub struct CamChannel {
     enable: u8,
     polarity: u8,
-    /// Bits of the cams whose limits some position can reach.
+    /// The range of the positions, modulo 2^32.
+    range: u32,
+    /// Bits of the cams that begin within the range.
     reachable: u8,
     /// For each cam: the window in which the cam goes on, and the window in which the cam stays on.
     windows: [[Window; 2]; 8],
@@ -61,13 +69,14 @@ pub struct CamChannel {
 }
 
 impl CamChannel {
-    /// Takes over parameters.
-    pub fn apply(&mut self, cams: &Cams) {
+    /// Takes over parameters. Positions repeat after `range`, at most 2^32.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn apply(&mut self, cams: &Cams, range: i64) {
         (self.enable, self.polarity, self.reachable) = (cams.enable, cams.polarity, 0);
+        self.range = range as u32;
         for ((cam, windows), bit) in cams.cams.iter().zip(&mut self.windows).zip(BITS) {
-            let [on, stay] = [0, cam.hysteresis].map(|margin| Window::new(cam, margin));
-            self.reachable |= if on.is_some() { bit } else { 0 };
-            *windows = [on.unwrap_or_default(), stay.unwrap_or_default()];
+            *windows = [0, cam.hysteresis].map(|margin| Window::new(cam, margin, range));
+            self.reachable |= if i64::from(cam.low.min(cam.high)) < range { bit } else { 0 };
         }
     }
 
@@ -78,7 +87,7 @@ impl CamChannel {
         let mut active = 0;
         for ([on, stay], bit) in self.windows.iter().zip(BITS) {
             let window = if self.active & bit == 0 { on } else { stay };
-            active |= if window.contains(position) { bit } else { 0 };
+            active |= if window.contains(position, self.range) { bit } else { 0 };
         }
         self.active = active & self.enable & self.reachable;
         (self.active ^ self.polarity) & self.enable
@@ -95,7 +104,7 @@ mod tests {
 
     fn channel(cam: Cam, enable: u8, polarity: u8) -> CamChannel {
         let mut channel = CamChannel::default();
-        channel.apply(&Cams { cams: [cam; 8], enable, polarity });
+        channel.apply(&Cams { cams: [cam; 8], enable, polarity }, WHOLE);
         channel
     }
 
@@ -117,16 +126,21 @@ mod tests {
         }
     }
 
+    const WHOLE: i64 = 1 << 32;
+
     /// The same rule, step by step: a cam goes on inside its window and goes off beyond the margin.
-    fn walk(cam: Cam, positions: &[u32]) -> Vec<bool> {
+    fn walk(cam: Cam, positions: &[u32], range: i64) -> Vec<bool> {
         let (low, high) = (i64::from(cam.low.min(cam.high)), i64::from(cam.low.max(cam.high)));
         let margin = i64::from(cam.hysteresis);
         let mut on = false;
         let mut states = Vec::new();
         for position in positions.iter().map(|p| i64::from(*p)) {
-            if position >= low && position <= high {
+            let seen = [position, position - range, position + range];
+            let seen = &seen[..if low - margin < range { 3 } else { 2 }];
+            let on_seen = &seen[..if low < range { seen.len() } else { 2 }];
+            if on_seen.iter().any(|p| (low..=high).contains(p)) {
                 on = true;
-            } else if position < low - margin || position > high + margin {
+            } else if !seen.iter().any(|p| (low - margin..=high + margin).contains(p)) {
                 on = false;
             }
             states.push(on);
@@ -141,8 +155,8 @@ mod tests {
             positions in prop::collection::vec(any_position(), 1..60),
         ) {
             let mut channel = CamChannel::default();
-            channel.apply(&Cams { cams, enable, polarity });
-            let walks = cams.map(|cam| walk(cam, &positions));
+            channel.apply(&Cams { cams, enable, polarity }, WHOLE);
+            let walks = cams.map(|cam| walk(cam, &positions, WHOLE));
             for (i, position) in positions.into_iter().enumerate() {
                 let active = walks.iter().zip(BITS).map(|(walk, bit)| if walk[i] { bit } else { 0 }).sum::<u8>();
                 prop_assert_eq!(channel.update(position), (active ^ polarity) & enable);
@@ -162,11 +176,41 @@ mod tests {
         let cams = |enable| Cams { cams: [cam; 8], enable, polarity: 0 };
         let mut channel = channel(cam, 1, 0);
         assert_eq!(channel.update(20), 1);
-        channel.apply(&cams(1));
+        channel.apply(&cams(1), WHOLE);
         assert_eq!(channel.update(25), 1);
-        channel.apply(&cams(0));
+        channel.apply(&cams(0), WHOLE);
         assert_eq!(channel.update(25), 0);
-        channel.apply(&cams(1));
+        channel.apply(&cams(1), WHOLE);
         assert_eq!(channel.update(25), 0);
+    }
+
+    /// 19 changes in a dither over zero, with a hysteresis of 10 (E30).
+    #[test]
+    fn hysteresis_and_windows_go_across_zero() {
+        let range = 36_000;
+        let states = |cam: Cam, positions: &[u32]| {
+            let mut channel = CamChannel::default();
+            channel.apply(&Cams { cams: [cam; 8], enable: 1, polarity: 0 }, range);
+            positions.iter().map(|position| channel.update(*position)).collect::<Vec<u8>>()
+        };
+        let dither: Vec<u32> = (0..20).map(|n| if n % 2 == 0 { 3 } else { 35_995 }).collect();
+        assert_eq!(states(Cam { low: 0, high: 100, hysteresis: 10 }, &dither), [1; 20]);
+        assert_eq!(states(Cam { low: 35_900, high: 35_999, hysteresis: 10 }, &dither)[1..], [1; 19]);
+        let across =
+            [35_899, 35_900, 35_999, 0, 100, 101].map(|at| (at, u8::from(at != 35_899 && at != 101)));
+        for (low, high) in [(-100, 100), (35_900, 36_100)] {
+            for (at, state) in across {
+                assert_eq!(
+                    states(Cam { low, high, hysteresis: 0 }, &[at]),
+                    [state],
+                    "{low} to {high} at {at}"
+                );
+            }
+        }
+        assert_eq!(
+            states(Cam { low: 36_000, high: 36_100, hysteresis: 0 }, &[0, 50]),
+            [0, 0],
+            "beyond the range"
+        );
     }
 }

@@ -2,7 +2,10 @@
 
 use super::channel::{Channel, Pending};
 use super::supervision::{Conditions, Supervision, supported_warnings};
-use super::{ChannelParameters, ChannelValues, Limits, Parameters, RetainedChannel, RetainedState, Start};
+use super::{
+    ALARM_POSITION, ChannelParameters, ChannelValues, Limits, Parameters, RetainedChannel, RetainedState,
+    Start,
+};
 use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 
@@ -54,6 +57,7 @@ impl Encoder {
     /// An encoder after power-on. There is no position until parameters are applied: the first parameters tell whether
     /// the retained positions belong to these sensors.
     #[must_use]
+    #[inline(never)]
     pub fn new(start: Start) -> Encoder {
         Encoder {
             channels: [None, None],
@@ -77,7 +81,11 @@ impl Encoder {
         self.retained.operating_time.tick();
         if let Some(mask) = self.acknowledge.take() {
             let [low, high, ..] = mask.to_le_bytes();
-            self.supervision.acknowledge(u16::from_le_bytes([low, high]));
+            let mask = u16::from_le_bytes([low, high]);
+            self.supervision.acknowledge(mask);
+            if mask & ALARM_POSITION != 0 {
+                self.channels.iter_mut().flatten().for_each(Channel::believe);
+            }
         }
         *snapshot = self.fixed;
         for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
@@ -97,10 +105,10 @@ impl Encoder {
     pub(crate) fn retain_in(&self, words: &mut [u32; RETAINED_WORDS]) {
         let (places, rest) = words.as_chunks_mut::<{ RetainedChannel::WORDS }>();
         for ((place, channel), before) in places.iter_mut().zip(&self.channels).zip(&self.retained.channels) {
-            match channel {
-                Some(channel) => channel.retain(place),
-                None => *place = before.to_words(),
-            }
+            *place = match channel {
+                Some(channel) => channel.retained().to_words(),
+                None => before.to_words(),
+            };
         }
         rest.iter_mut().zip(self.retained.operating_time.to_words()).for_each(|(to, from)| *to = from);
     }
@@ -109,12 +117,10 @@ impl Encoder {
     #[must_use]
     #[inline(never)]
     pub fn retained_state(&self) -> RetainedState {
-        let ([first, second], [before, before_too]) = (&self.channels, &self.retained.channels);
-        let retained = |channel: &Option<Channel>, before: &RetainedChannel| match channel {
-            Some(channel) => channel.retained(),
-            None => *before,
-        };
-        let channels = [retained(first, before), retained(second, before_too)];
+        let mut channels = self.retained.channels;
+        for (retained, channel) in channels.iter_mut().zip(&self.channels) {
+            *retained = channel.as_ref().map_or(*retained, Channel::retained);
+        }
         RetainedState { channels, operating_time: self.retained.operating_time }
     }
 }

@@ -2,9 +2,9 @@
 
 use super::area::area_state;
 use super::commissioning::Commissioning;
-use super::input::{Input, LastPosition};
-use super::reference::Trust;
+use super::input::Input;
 use super::speed::speed_value;
+use super::trust::ALL;
 use super::{
     Area, CamChannel, ChannelParameters, Command, Module, Parameters, Position, Progress, RetainedChannel,
     Scale, Sensor, Speedometer,
@@ -33,6 +33,10 @@ pub struct ChannelValues {
     /// The position that the readings of the sensor would give: equal to [`position`](ChannelValues::position) unless
     /// the readings are rejected as implausible.
     pub reading: u32,
+    /// A bit for each user of the sensor whose position is not known.
+    pub unknown: u8,
+    /// The sensor does not answer, for longer than is tolerated.
+    pub is_broken: bool,
 }
 
 /// The counter of the commands that were taken, and the command that waits.
@@ -71,7 +75,7 @@ pub(super) struct Channel {
     module: Module,
     commissioning: Commissioning,
     preset: Pending,
-    references: u8,
+    references: [u8; 4],
 }
 
 impl Channel {
@@ -87,9 +91,8 @@ impl Channel {
     ) -> Channel {
         let scale = all.scale(&sensor);
         let resolution = sensor.resolution();
-        let start = retained.start_position(sensor.kind, resolution);
         let mut channel = Channel {
-            input: Input::new(sensor, &scale, all.module.offset, start),
+            input: Input::new(sensor, &scale, all.module.offset, own.users, retained),
             resolution,
             position: Position::new(scale, offset),
             speedometer: Speedometer::new(0),
@@ -116,11 +119,13 @@ impl Channel {
         let scale = all.scale(&sensor);
         let shaft = self.input.tracker().map(super::Tracker::shaft).unwrap_or_default();
         self.position.rescale(scale, shaft);
-        self.input.apply(sensor, &scale, all.module.offset);
+        self.input.apply(sensor, &scale, all.module.offset, own.users);
         self.preset.set(own.preset);
-        let references = core::mem::replace(&mut self.references, own.references);
-        if ![0, references].contains(&own.references) {
-            self.input.refer();
+        for (user, (before, now)) in self.references.iter_mut().zip(own.references).enumerate() {
+            if ![0, *before].contains(&now) {
+                self.input.refer(1 << user);
+            }
+            *before = now;
         }
         self.configure(all, own, &scale);
     }
@@ -129,7 +134,7 @@ impl Channel {
     fn configure(&mut self, all: &Parameters, own: &ChannelParameters, scale: &Scale) {
         let factor = all.speed_factor(self.input.sensor());
         self.speed_factor = if scale.is_reversed() { -factor } else { factor };
-        self.cams.apply(&own.cams);
+        self.cams.apply(&own.cams, scale.range().get().cast_signed());
         (self.area, self.module) = (own.area, all.module);
         self.commissioning.set(all.operating & super::COMMISSIONING != 0);
     }
@@ -139,15 +144,19 @@ impl Channel {
     pub(super) fn sample(&mut self, raw: &RawEncoder) -> ChannelValues {
         let preset = self.preset.take();
         if preset.is_some() {
-            self.input.refer();
+            self.input.refer(ALL);
         }
         let seen = self.input.read(raw, self.position.scale());
-        self.commissioning.observe(self.input.sensor(), &seen);
+        if self.input.has_begun() {
+            self.commissioning.observe(self.input.sensor(), &seen);
+        }
         let fixed = ChannelValues {
             sensor_state: seen.state,
             commissioning: self.commissioning.progress(),
             offset: self.position.offset(),
             presets: self.preset.count,
+            unknown: self.input.unknown(),
+            is_broken: seen.is_broken,
             ..ChannelValues::default()
         };
         let Some(tracker) = self.input.tracker() else { return fixed };
@@ -156,11 +165,13 @@ impl Channel {
         }
         let position = self.position.value(tracker.shaft());
         let speed = self.speedometer.update(tracker.count());
+        // At most 2^32.
+        let range = self.position.scale().range().get().cast_signed();
         ChannelValues {
             position,
             speed: speed_value(speed, self.speed_factor),
             cams: self.cams.update(position),
-            area: area_state(&self.area, &self.module, position, self.input.native()),
+            area: area_state(&self.area, &self.module, position, range, self.input.native()),
             offset: self.position.offset(),
             reading: self.reading(position),
             ..fixed
@@ -173,28 +184,15 @@ impl Channel {
         there.map_or(position, |there| self.position.scale().value(there.shaft(), self.position.offset()))
     }
 
-    /// The state to be retained in the memory with the battery.
-    pub(super) fn retained(&self) -> RetainedChannel {
-        let kind = self.input.sensor().kind;
-        let (trust, needs_memory) = (Trust::from_bits(self.input.trust()), self.input.needs_memory());
-        let retained = |last| RetainedChannel::new(kind, self.resolution, last);
-        match (self.input.tracker(), self.input.last()) {
-            (Some(tracker), _) => retained(LastPosition { total: tracker.total(), trust, needs_memory }),
-            (None, Some(last)) => retained(last),
-            (None, None) => RetainedChannel::unread((trust.lost, needs_memory)),
-        }
+    /// Accepts rejected readings, where the reading alone is the position.
+    #[inline(never)]
+    pub(super) fn believe(&mut self) {
+        self.input.believe();
     }
 
-    /// Writes the same state to `words`, in its stored form.
+    /// The state to be retained in the memory with the battery.
     #[inline]
-    pub(super) fn retain(&self, words: &mut [u32; RetainedChannel::WORDS]) {
-        match self.input.tracker() {
-            Some(tracker) => {
-                let kind = self.input.sensor().kind;
-                let (trust, needs_memory) = (self.input.trust(), self.input.needs_memory());
-                *words = RetainedChannel::words(kind, self.resolution, tracker.total(), trust, needs_memory);
-            }
-            None => *words = self.retained().to_words(),
-        }
+    pub(super) fn retained(&self) -> RetainedChannel {
+        self.input.retained(self.resolution)
     }
 }

@@ -19,8 +19,8 @@ pub(super) struct ImplausibleReadings {
     step: i32,
     /// The readings have jumped away and may jump back.
     has_jumped: bool,
-    /// Number of rejected readings.
-    readings: u32,
+    /// Milliseconds since the first rejected reading, and one.
+    millis: u32,
 }
 
 impl ImplausibleReadings {
@@ -35,7 +35,7 @@ impl ImplausibleReadings {
             expected,
             step,
             has_jumped: away.unsigned_abs() > fastest,
-            readings: 1,
+            millis: 1,
         }
     }
 
@@ -44,13 +44,14 @@ impl ImplausibleReadings {
         self.word
     }
 
-    /// Number of rejected readings.
-    pub(super) fn readings(&self) -> u32 {
-        self.readings
+    /// Milliseconds since the last reading that was accepted.
+    pub(super) fn millis(&self) -> u32 {
+        self.millis
     }
 
     /// Counts a millisecond without a reading.
     pub(super) fn skip(&mut self) {
+        self.millis = self.millis.saturating_add(1);
         self.expected = self.expected.wrapping_add_signed(self.step);
     }
 
@@ -62,7 +63,7 @@ impl ImplausibleReadings {
         }
         self.expected = self.expected.wrapping_add_signed(self.step);
         self.word = word;
-        self.readings = self.readings.saturating_add(1);
+        self.millis = self.millis.saturating_add(1);
         self.has_jumped && between(self.expected, word, self.unused).unsigned_abs() <= fastest
     }
 }

@@ -1,11 +1,13 @@
 //! From the readings of the hardware to the movement of one sensor.
 
 use crate::board::RawEncoder;
-use core::num::{NonZeroU32, NonZeroU64};
+use core::num::NonZeroU32;
 
 use super::implausible::ImplausibleReadings;
-use super::reference::{Marks, Reference, Trust};
-use super::{Fault, Scale, Sensor, Tracker};
+use super::parameters::automatic;
+use super::reference::{Marks, Reference};
+use super::trust::{ALL, Basis, Rest, Trust, deviation};
+use super::{Fault, RetainedChannel, Scale, Sensor, Tracker};
 
 /// Sensor state: the encoder does not answer.
 pub const SENSOR_NO_SIGNAL: u8 = 1 << 0;
@@ -37,9 +39,11 @@ const GAP_MILLIS: u32 = 10;
 /// Samples that a gap affects: an SSI word belongs to the sample before.
 const GAP_SAMPLES: u8 = 2;
 
-/// Divisor for the two ends of the code's range (1/512 each) in which a sensor may leave the range while the power is
-/// off.
-const EDGE: i64 = 512;
+/// Part of a long code at each of its ends in which the sensor may leave the code while the power is off.
+const EDGE: i64 = 4;
+
+/// Readings after a start in which a shaft that moves has moved before too.
+const YOUNG: u8 = 10;
 
 /// Result of one sample: state and movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,26 +54,8 @@ pub(super) struct Observation {
     pub(super) moved: i32,
     /// The position as coded on the line.
     pub(super) code: u32,
-}
-
-/// The position at the last loss of power.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct LastPosition {
-    /// Steps from the origin.
-    pub(super) total: i64,
-    /// How far the position can be trusted.
-    pub(super) trust: Trust,
-    /// See [`Input::needs_memory`].
-    pub(super) needs_memory: bool,
-}
-
-/// Retained knowledge of a sensor at start.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct StartPosition {
-    /// The retained position.
-    pub(super) last: Option<LastPosition>,
-    /// A position should have been retained, and was lost.
-    pub(super) lost: bool,
+    /// The encoder has not answered for longer than is tolerated.
+    pub(super) is_broken: bool,
 }
 
 /// The input of one sensor, with its state.
@@ -78,12 +64,14 @@ pub(super) struct Input {
     sensor: Sensor,
     /// Distance from the zero of the sensor to the zero of the encoder (650Ah:1).
     offset: i32,
-    last: Option<LastPosition>,
+    /// The retained state, until the sensor has been read.
+    last: RetainedChannel,
+    basis: Basis,
     reference: Reference,
-    /// The code wraps before the position does, so the number of wraps matters.
-    comes_round: bool,
-    /// The code has come near one of its ends: from then on only retained memory tells how often the code has wrapped.
-    needs_memory: bool,
+    /// A long code has come near one of its ends: from then on only retained memory tells how often the code has
+    /// wrapped.
+    /// [`Trust::NEEDS_MEMORY`] or 0.
+    needs_memory: u8,
     /// The counted position; `None` until the first good reading.
     tracker: Option<Tracker>,
     /// Milliseconds since the last good reading.
@@ -94,25 +82,46 @@ pub(super) struct Input {
     implausible: Option<ImplausibleReadings>,
     /// Number of coming samples in which the sensor may have moved further than in a millisecond.
     gap: u8,
+    rest: Rest,
+    /// Number of coming readings in which a movement means that the sensor has moved unseen.
+    young: u8,
 }
 
 impl Input {
-    /// A sensor that has not been read yet.
-    pub(super) fn new(sensor: Sensor, scale: &Scale, offset: i32, start: StartPosition) -> Input {
-        let StartPosition { last, lost } = start;
-        let trust = last.map_or(Trust { lost, ..Trust::default() }, |last| last.trust);
+    /// A sensor that has not been read yet, with the retained state of the channel.
+    pub(super) fn new(
+        sensor: Sensor,
+        scale: &Scale,
+        offset: i32,
+        users: u8,
+        retained: &RetainedChannel,
+    ) -> Input {
+        let (basis, marks) = marks(&sensor, scale, users);
+        let is_same = retained.is_of(sensor.kind, sensor.resolution());
+        let is_forgotten = retained.kind == 0 && retained.trust.lost() != 0;
+        let needs_memory =
+            if basis == Basis::LongCode { retained.trust.flags & Trust::NEEDS_MEMORY } else { 0 };
+        let is_lost = if is_forgotten {
+            basis != Basis::LongCode || needs_memory != 0
+        } else {
+            retained.kind != 0 && !is_same && sensor.kind.is_counted()
+        };
+        let known = if is_same { retained.trust } else { Trust::default() };
+        let trust = Trust::at_start(if is_lost { Trust::NONE } else { known }, basis);
         Input {
             sensor,
             offset,
-            last,
-            reference: Reference::new(marks(&sensor, scale), trust),
-            comes_round: comes_round(&sensor, scale),
-            needs_memory: last.is_some_and(|last| last.needs_memory),
+            last: if is_same { *retained } else { RetainedChannel::default() },
+            basis,
+            reference: Reference::new(marks, trust),
+            needs_memory,
             tracker: None,
             missed: 0,
             step: 0,
             implausible: None,
             gap: 0,
+            rest: Rest::new(is_same && retained.trust.has(Trust::MOVING)),
+            young: if is_same && matches!(basis, Basis::ShortCode | Basis::Count) { YOUNG } else { 0 },
         }
     }
 
@@ -122,11 +131,14 @@ impl Input {
     }
 
     /// Takes other parameters of the same sensor: moves the zero, and counts in the turns of this scale.
-    pub(super) fn apply(&mut self, sensor: Sensor, scale: &Scale, offset: i32) {
+    pub(super) fn apply(&mut self, sensor: Sensor, scale: &Scale, offset: i32, users: u8) {
         self.sensor = sensor;
-        self.reference.apply(marks(&sensor, scale));
-        self.comes_round = comes_round(&sensor, scale);
-        self.needs_memory &= self.comes_round;
+        let (basis, marks) = marks(&sensor, scale, users);
+        self.basis = basis;
+        self.reference.apply(marks);
+        if basis != Basis::LongCode {
+            self.needs_memory = 0;
+        }
         let moved = i64::from(offset) - i64::from(self.offset);
         self.offset = offset;
         if let Some(tracker) = &mut self.tracker {
@@ -135,15 +147,34 @@ impl Input {
         }
     }
 
-    /// A preset makes the position known: the present reading is accepted, and the count is corrected.
+    /// A preset makes the position of a user known: the present reading is accepted, and the count is corrected.
     #[inline(never)]
-    pub(super) fn refer(&mut self) {
-        let correction = self.reference.preset();
+    pub(super) fn refer(&mut self, user: u8) {
+        if self.implausible.is_some() {
+            self.reference.lose();
+        }
+        let correction = self.reference.preset(user);
+        self.accept();
         if let Some(tracker) = &mut self.tracker {
-            if let Some(implausible) = self.implausible.take() {
-                tracker.follow(implausible.word());
-            }
             tracker.correct(correction);
+        }
+        if self.reference.unknown() == 0 && !self.has_wrapped() {
+            self.needs_memory = 0;
+        }
+    }
+
+    /// Accepts rejected readings of a sensor that answers, where the reading alone is the position.
+    pub(super) fn believe(&mut self) {
+        if self.basis == Basis::Code && self.missed == 0 {
+            self.accept();
+        }
+    }
+
+    /// Accepts rejected readings.
+    #[inline(never)]
+    fn accept(&mut self) {
+        if let (Some(tracker), Some(implausible)) = (&mut self.tracker, self.implausible.take()) {
+            tracker.follow(implausible.word());
         }
     }
 
@@ -179,22 +210,37 @@ impl Input {
         i64::from(tracker.word()) + i64::from(self.offset)
     }
 
-    /// How far the position can be trusted at the next start: bits of [`Trust`]. While readings are rejected, the
-    /// position counts as lost.
-    #[inline]
-    pub(super) fn trust(&self) -> u8 {
-        self.reference.trust() | if self.implausible.is_some() { Trust::LOST } else { 0 }
+    /// Whether the sensor has been read, or should have been.
+    pub(super) fn has_begun(&self) -> bool {
+        self.tracker.is_some() || self.missed > GAP_MILLIS
     }
 
-    /// Whether only retained memory tells how often the code has wrapped.
+    /// A bit for each user whose position is not known.
     #[inline]
-    pub(super) fn needs_memory(&self) -> bool {
-        self.needs_memory
+    pub(super) fn unknown(&self) -> u8 {
+        if self.is_rejecting() { ALL } else { self.reference.unknown() }
     }
 
-    /// The retained position, until the sensor has been read.
-    pub(super) fn last(&self) -> Option<LastPosition> {
-        self.last
+    /// The state to be retained for the next start. While readings are rejected, the position counts as lost.
+    #[inline]
+    pub(super) fn retained(&self, resolution: u32) -> RetainedChannel {
+        let Some(tracker) = &self.tracker else { return self.unread() };
+        let mut trust = self.reference.trust();
+        trust.flags |= self.needs_memory | if self.rest.is_moving() { Trust::MOVING } else { 0 };
+        if self.implausible.is_some() {
+            trust.lose();
+        }
+        RetainedChannel { kind: self.sensor.kind.code(), resolution, total: tracker.total(), trust }
+    }
+
+    /// The same before the first reading.
+    #[inline(never)]
+    fn unread(&self) -> RetainedChannel {
+        if self.last.kind != 0 {
+            return self.last;
+        }
+        let trust = Trust { flags: self.needs_memory, ..self.reference.trust() };
+        RetainedChannel { trust, ..RetainedChannel::default() }
     }
 
     /// Takes a sample.
@@ -214,67 +260,143 @@ impl Input {
             Some(Ok(reading)) => reading,
         };
         let word = reading.position & (u32::MAX >> (32 - self.sensor.bits().clamp(1, 32)));
-        if !self.is_plausible(word) {
+        let moved = self.way(word);
+        if !self.is_plausible(word, moved) {
             return self.stay();
         }
-        if self.missed > 0 {
-            self.come_back();
-        }
-        self.step = self.follow(word, scale);
+        self.take(word, moved, scale);
+        self.missed = 0;
         self.note_edge();
+        self.note_rest();
         let alarm = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };
-        Observation { state: alarm | self.reference.state(), moved: self.step, code: reading.code }
+        Observation { state: alarm | self.reference.state(), moved, code: reading.code, is_broken: false }
     }
 
-    /// Whether the sensor can have moved to this reading.
+    /// Milliseconds since the last reading that was accepted.
+    fn millis(&self) -> u32 {
+        let rejected = self.implausible.map_or(0, |implausible| implausible.millis());
+        self.missed.max(rejected).saturating_add(1)
+    }
+
+    /// Steps from the last good reading to this one: the way that is nearest to an even movement.
     #[inline]
-    fn is_plausible(&mut self, word: u32) -> bool {
+    fn way(&self, word: u32) -> i32 {
+        let Some(tracker) = &self.tracker else { return 0 };
+        if self.missed == 0 && self.implausible.is_none() && self.gap == 0 {
+            return tracker.distance(word);
+        }
+        self.long_way(tracker, word)
+    }
+
+    #[inline(never)]
+    fn long_way(&self, tracker: &Tracker, word: u32) -> i32 {
+        let even = if self.is_uncertain() || self.gap > 0 {
+            0
+        } else {
+            self.step.saturating_mul(self.millis().cast_signed())
+        };
+        even.saturating_add(tracker.distance(word.wrapping_sub(even.cast_unsigned())))
+    }
+
+    /// Whether the code, or the counter, can have made half a round more or less than expected since the last reading.
+    #[inline(never)]
+    fn is_uncertain(&self) -> bool {
+        let gap = if self.gap > 0 { GAP_MILLIS } else { 0 };
+        // In a gap the time is not known, so the speed counts as uncertain too.
+        let way = self.step.unsigned_abs().saturating_mul(gap);
+        let away = deviation(self.limit(), self.millis().saturating_add(gap)).saturating_add(way);
+        away >= 1 << (self.sensor.bits() - 1)
+    }
+
+    /// The fastest movement, also where 2104h sets no limit.
+    fn limit(&self) -> u32 {
+        if self.sensor.fastest == 0 { automatic(&self.sensor) } else { self.sensor.fastest }
+    }
+
+    /// Takes a reading that is `moved` steps from the last one.
+    #[inline]
+    fn take(&mut self, word: u32, moved: i32, scale: &Scale) {
+        let Some(tracker) = &mut self.tracker else { return self.begin(word, scale) };
+        tracker.advance(word, moved);
+        self.step = moved;
+        if self.missed > 0 || self.gap > 0 || self.implausible.is_some() {
+            self.end_outage();
+        }
+    }
+
+    /// Readings are back. If the code may have wrapped in the meantime, the number of wraps is not known.
+    #[inline(never)]
+    fn end_outage(&mut self) {
+        // Cannot be zero.
+        self.step = self.step.checked_div(self.millis().cast_signed()).unwrap_or(0);
+        if self.basis.has_rounds() && self.is_uncertain() {
+            self.reference.lose();
+        }
+        self.implausible = None;
+    }
+
+    /// Takes note of a movement, and of one right after the start: the sensor has moved before, unseen.
+    #[inline]
+    fn note_rest(&mut self) {
+        let Some(tracker) = &self.tracker else { return };
+        let has_left = self.rest.follow(tracker.count());
+        if self.young > 0 {
+            self.young -= 1;
+            if has_left {
+                self.reference.unseen();
+            }
+        }
+    }
+
+    /// Whether the sensor can have moved to this reading, `moved` steps from the last one.
+    #[inline]
+    fn is_plausible(&mut self, word: u32, moved: i32) -> bool {
         let fastest = self.sensor.fastest;
         let Some(tracker) = &self.tracker else { return true };
-        let is_back = match &mut self.implausible {
+        let is_near = match &mut self.implausible {
             _ if fastest == 0 => true,
-            Some(implausible) => implausible.is_back(word, fastest),
-            // The longer there was no reading, the further the sensor may have moved.
-            None if self.missed == 0 && self.gap == 0 => tracker.distance(word).unsigned_abs() <= fastest,
+            Some(implausible) => return implausible.is_back(word, fastest),
+            None if self.missed == 0 && self.gap == 0 => moved.unsigned_abs() <= fastest,
             None => {
+                // The longer there was no reading, the further the sensor may have moved.
                 let gap = if self.gap > 0 { GAP_MILLIS } else { 0 };
                 let millis = self.missed.saturating_add(1).saturating_add(gap);
-                tracker.distance(word).unsigned_abs() <= fastest.saturating_mul(millis)
+                moved.unsigned_abs() <= fastest.saturating_mul(millis)
             }
         };
-        if is_back {
-            self.implausible = None;
-        } else if self.implausible.is_none() {
+        if !is_near {
             self.implausible =
                 Some(ImplausibleReadings::new(self.sensor.bits(), tracker.word(), self.step, word, fastest));
         }
-        is_back
+        is_near
     }
 
     /// Keeps the position where it was before the readings jumped.
-    fn stay(&self) -> Observation {
-        let lasts = self.implausible.is_some_and(|implausible| implausible.readings() > TOLERATED_MISSES);
-        let error = if lasts { SENSOR_POSITION_ERROR } else { 0 };
+    fn stay(&mut self) -> Observation {
+        self.missed = 0;
+        self.rest.miss();
+        let error = if self.is_rejecting() { SENSOR_POSITION_ERROR } else { 0 };
         Observation { state: SENSOR_IMPLAUSIBLE | error | self.reference.state(), ..Observation::default() }
     }
 
-    /// Good readings are back. If the code may have wrapped in the meantime, the number of wraps is unknown.
-    #[inline(never)]
-    fn come_back(&mut self) {
-        let most = u64::from(self.sensor.fastest) * (u64::from(self.missed) + 1);
-        let is_outage = self.missed > TOLERATED_MISSES && self.tracker.is_some();
-        if self.comes_round && is_outage && most >= 1 << (self.sensor.bits() - 1) {
-            self.reference.lose();
-        }
-        self.missed = 0;
+    /// Whether readings are rejected for longer than is tolerated.
+    fn is_rejecting(&self) -> bool {
+        self.implausible.is_some_and(|implausible| implausible.millis() > TOLERATED_MISSES)
     }
 
     fn note_edge(&mut self) {
-        if self.comes_round && !self.needs_memory {
+        if self.basis == Basis::LongCode && self.needs_memory == 0 {
             let code = 1_i64 << self.sensor.bits();
             let total = self.tracker.as_ref().map_or(0, Tracker::total).wrapping_sub(self.offset.into());
-            self.needs_memory = total < code / EDGE || total >= code - code / EDGE;
+            let is_near = total < code / EDGE || total >= code - code / EDGE;
+            self.needs_memory = if is_near { Trust::NEEDS_MEMORY } else { 0 };
         }
+    }
+
+    /// Whether the count has left the code in which it began.
+    fn has_wrapped(&self) -> bool {
+        let total = self.tracker.as_ref().map_or(0, Tracker::total).wrapping_sub(self.offset.into());
+        self.tracker.is_some_and(|tracker| total != i64::from(tracker.word()))
     }
 
     fn miss(&mut self, state: u8) -> Observation {
@@ -282,12 +404,24 @@ impl Input {
             implausible.skip();
         }
         self.missed = self.missed.saturating_add(1);
-        let error = if self.missed > TOLERATED_MISSES { SENSOR_POSITION_ERROR } else { 0 };
-        Observation { state: state | error | self.reference.state(), ..Observation::default() }
+        self.rest.miss();
+        let lasts = self.missed > TOLERATED_MISSES;
+        let error = if lasts || self.is_rejecting() { SENSOR_POSITION_ERROR } else { 0 };
+        Observation {
+            state: state | error | self.reference.state(),
+            is_broken: lasts && state == SENSOR_NO_SIGNAL,
+            ..Observation::default()
+        }
     }
 
     fn count(&mut self, raw: &RawEncoder, scale: &Scale) -> Observation {
-        let moved = self.follow(raw.counter.into(), scale);
+        let word = raw.counter.into();
+        let moved = self.tracker.as_ref().map_or(0, |tracker| tracker.distance(word));
+        if self.gap > 0 && self.is_uncertain() {
+            self.reference.unseen();
+        }
+        self.take(word, moved, scale);
+        self.note_rest();
         let fastest = self.sensor.fastest;
         let is_fast = moved.unsigned_abs() > fastest && fastest > 0 && self.gap == 0;
         if is_fast {
@@ -301,32 +435,24 @@ impl Input {
         }
         let too_fast = if is_fast { SENSOR_TOO_FAST | SENSOR_POSITION_ERROR } else { 0 };
         let state = self.reference.state() | too_fast;
-        Observation { state, moved, code: raw.counter.into() }
-    }
-
-    #[inline]
-    fn follow(&mut self, word: u32, scale: &Scale) -> i32 {
-        if let Some(tracker) = &mut self.tracker {
-            return tracker.follow(word);
-        }
-        self.begin(word, scale);
-        0
+        Observation { state, moved, code: word, is_broken: false }
     }
 
     /// The first reading: decides where counting continues.
     #[inline(never)]
     fn begin(&mut self, word: u32, scale: &Scale) {
         let (turn, bits) = (scale.turn(), self.sensor.bits());
-        let total = match self.last {
-            Some(last) if self.sensor.kind.is_absolute() => {
+        let last = (self.last.kind != 0).then_some(self.last.total);
+        let total = match (self.basis, last) {
+            (Basis::LongCode | Basis::ShortCode, Some(last)) => {
                 // From the retained position, the shorter way to the present reading.
-                let then = low_word(last.total.wrapping_sub(self.offset.into()));
-                let moved = Tracker::new(turn, bits, then, last.total).distance(word);
-                last.total.saturating_add(moved.into())
+                let then = low_word(last.wrapping_sub(self.offset.into()));
+                let moved = Tracker::new(turn, bits, then, last).distance(word);
+                last.saturating_add(moved.into())
             }
-            Some(last) => last.total,
-            None if self.sensor.kind.is_absolute() => i64::from(word) + i64::from(self.offset),
-            None => self.offset.into(),
+            (Basis::Count, Some(last)) => last,
+            (Basis::Start | Basis::Count, _) => self.offset.into(),
+            _ => i64::from(word) + i64::from(self.offset),
         };
         self.tracker = Some(Tracker::new(turn, bits, word, total));
     }
@@ -349,24 +475,20 @@ impl Input {
     }
 }
 
-/// Properties of a sensor's index.
-fn marks(sensor: &Sensor, scale: &Scale) -> Marks {
+/// What determines the position of a sensor, and the properties of its index.
+#[inline(never)]
+fn marks(sensor: &Sensor, scale: &Scale, users: u8) -> (Basis, Marks) {
+    let basis = Basis::of(sensor, scale);
     let is_used = sensor.index && !sensor.kind.is_absolute();
     let is_linear = sensor.kind.is_linear();
-    Marks {
+    let marks = Marks {
         is_used,
         turn: (!is_linear).then_some(sensor.resolution),
-        suffice: is_used && (is_linear || u64::from(scale.units()) % scale.range() == 0),
-    }
-}
-
-/// Whether the code of an absolute sensor wraps before the position does: the code is not a whole number of ranges
-/// long.
-fn comes_round(sensor: &Sensor, scale: &Scale) -> bool {
-    let units = (1 << sensor.bits().min(32)) * u64::from(scale.units());
-    // A turn and a range have at most 2^32 steps each, so their product fits 64 bits.
-    let range = NonZeroU64::from(scale.turn()).saturating_mul(scale.range());
-    sensor.kind.is_absolute() && units % range != 0
+        suffice: is_used && (is_linear || scale.repeats_after(sensor.resolution.get().into())),
+        from_start: basis == Basis::Start,
+        users,
+    };
+    (basis, marks)
 }
 
 /// Steps to the nearest zero of a revolution.

@@ -26,8 +26,8 @@
 //!   position repeats after 6002h whatever the ratio of 6002h to 6001h is, since turns are counted without end.
 //! * A preset must be below 6002h; a higher one is refused. A change of the units sets the offset to 0; a change of the
 //!   direction keeps the position, and the offset follows ([`Position::rescale`]).
-//! * 6010h and 6020h are INTEGER32 (v3.1), 6003h and 6004h UNSIGNED32: the same 32 bits. Limits of cams and of the work
-//!   area are signed and compare with the position as an unsigned number.
+//! * 6010h and 6020h are INTEGER32 (v3.1), 6003h and 6004h UNSIGNED32: the same 32 bits. A limit of a cam or of the work
+//!   area below zero is a position at the end of the range.
 //! * Both channels are scaled by the same 6000h to 6002h; 6005h applies to linear encoders.
 //! * Cam limits in the wrong order are swapped. A disabled cam reads 0 whatever its polarity. Hysteresis moves the
 //!   points where a cam goes off outwards; for a cam that was off, the limits alone decide ([`Cam`]).
@@ -55,6 +55,7 @@ mod speed;
 mod ssi;
 mod supervision;
 mod tracker;
+mod trust;
 
 pub mod objects;
 

@@ -47,9 +47,10 @@ pub struct ChannelParameters {
     pub offset: i32,
     /// Preset (6003h, 6010h).
     pub preset: Command,
-    /// Counts the offsets found by another part of the device, which also tells that the position of the sensor is
-    /// right; 0 for none.
-    pub references: u8,
+    /// A bit for each user of the sensor whose position is reported: a position unit of a lift, or bit 0.
+    pub users: u8,
+    /// For each user, counts the presets by another part of the device; 0 for none.
+    pub references: [u8; 4],
     /// Cams (6301h to 6337h).
     pub cams: Cams,
     /// Work area (6401h, 6402h).
@@ -96,7 +97,8 @@ impl Default for ChannelParameters {
             fastest: AUTOMATIC,
             offset: 0,
             preset: Command::default(),
-            references: 0,
+            users: 1,
+            references: [0; 4],
             cams: Cams::default(),
             area: Area { low: 0, high: i32::MAX },
         }
@@ -239,14 +241,20 @@ fn with_limit(sensor: Sensor) -> Sensor {
     if sensor.fastest != AUTOMATIC {
         return sensor;
     }
-    let resolution = sensor.resolution();
-    // Half a turn in a millisecond could be either direction. The limit is well below that.
-    let limit = if sensor.kind.is_linear() {
-        HIGHEST_RATE / resolution.max(1)
+    Sensor { fastest: automatic(&sensor), ..sensor }
+}
+
+/// The most steps in a millisecond at [`HIGHEST_SPEED`] or [`HIGHEST_RATE`], and 3 % for the instants of the readings:
+/// the second one after a start comes late. Half a turn in a millisecond could be either direction; the limit is well
+/// below that.
+pub(super) fn automatic(sensor: &Sensor) -> u32 {
+    let resolution = sensor.resolution().max(1);
+    let steps = if sensor.kind.is_linear() {
+        HIGHEST_RATE.div_ceil(resolution)
     } else {
-        resolution / (60_000 / HIGHEST_SPEED)
+        resolution.div_ceil(60_000 / HIGHEST_SPEED)
     };
-    Sensor { fastest: limit.max(1), ..sensor }
+    steps.saturating_add(steps / 32)
 }
 
 fn direction_bit(sensor: &Sensor) -> u16 {

@@ -1,4 +1,4 @@
-//! Whether a count can be trusted, judged by the index and by the state retained through a loss of power.
+//! The index of a sensor, and what it says about the [`Trust`] in the count.
 //!
 //! The first index corrects the position. From then on:
 //!
@@ -15,6 +15,7 @@
 use core::num::NonZeroU32;
 
 use super::input::{SENSOR_INDEX, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED};
+use super::trust::{ALL, Trust};
 
 /// Steps by which the index may come too early or too late. The index is one quarter period wide and is seen at one
 /// edge forwards and at the other backwards, and the capture may fall on either side of the step that causes it.
@@ -33,36 +34,6 @@ enum Index {
     Elsewhere(i64),
 }
 
-/// How far the position can be trusted at a start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Trust {
-    /// The index has been seen.
-    pub(super) referenced: bool,
-    /// Turns have been lost.
-    pub(super) lost: bool,
-    /// Steps may have been lost.
-    pub(super) doubted: bool,
-}
-
-impl Trust {
-    /// One bit for each field.
-    pub(super) fn bits(self) -> u8 {
-        let Trust { referenced, lost, doubted } = self;
-        let bit = |set: bool, bit: u8| if set { bit } else { 0 };
-        bit(referenced, Trust::REFERENCED) | bit(lost, Trust::LOST) | bit(doubted, Trust::DOUBTED)
-    }
-
-    /// From the bits.
-    pub(super) fn from_bits(bits: u8) -> Trust {
-        let is = |bit: u8| bits & bit != 0;
-        Trust { referenced: is(Trust::REFERENCED), lost: is(Trust::LOST), doubted: is(Trust::DOUBTED) }
-    }
-
-    const REFERENCED: u8 = 1 << 0;
-    pub(super) const LOST: u8 = 1 << 1;
-    const DOUBTED: u8 = 1 << 2;
-}
-
 /// Properties of a sensor's index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Marks {
@@ -72,6 +43,10 @@ pub(super) struct Marks {
     pub(super) turn: Option<NonZeroU32>,
     /// The position repeats from one index to the next, so the index alone determines the position.
     pub(super) suffice: bool,
+    /// A sensor of a type that counts from its start: without a reference it is no error.
+    pub(super) from_start: bool,
+    /// A bit for each user whose position is reported.
+    pub(super) users: u8,
 }
 
 /// The reference of one sensor.
@@ -86,12 +61,13 @@ pub(super) struct Reference {
     too_many: u32,
     /// Bits of the sensor state that result.
     state: u8,
-    /// Bits of [`Trust`] to be retained for the next start.
-    retained: u8,
+    /// The users whose position is not known.
+    unknown: u8,
 }
 
 impl Reference {
     pub(super) fn new(marks: Marks, trust: Trust) -> Reference {
+        let trust = Trust { flags: trust.flags & Trust::REFERENCED, ..trust };
         let mut new = Reference {
             marks,
             trust,
@@ -99,7 +75,7 @@ impl Reference {
             since: 0,
             too_many: u32::MAX,
             state: 0,
-            retained: 0,
+            unknown: 0,
         };
         new.settle();
         new
@@ -121,9 +97,19 @@ impl Reference {
         self.state
     }
 
-    /// Bits of [`Trust`] to be retained for the next start.
-    pub(super) fn trust(&self) -> u8 {
-        self.retained
+    /// A bit for each user whose position is not known.
+    pub(super) fn unknown(&self) -> u8 {
+        self.unknown
+    }
+
+    /// The trust to be retained for the next start.
+    #[inline]
+    pub(super) fn trust(&self) -> Trust {
+        let mut trust = self.trust;
+        if self.index != Index::Right {
+            trust.doubt();
+        }
+        trust
     }
 
     /// Takes note of a movement.
@@ -142,13 +128,19 @@ impl Reference {
 
     /// Steps may have been lost.
     pub(super) fn doubt(&mut self) {
-        self.trust.doubted = true;
+        self.trust.doubt();
         self.settle();
     }
 
     /// Turns may have been lost.
     pub(super) fn lose(&mut self) {
-        self.trust.lost = true;
+        self.trust.lose();
+        self.settle();
+    }
+
+    /// The sensor may have moved unseen, by any distance.
+    pub(super) fn unseen(&mut self) {
+        self.trust = self.trust.unseen();
         self.settle();
     }
 
@@ -157,7 +149,7 @@ impl Reference {
     #[inline]
     pub(super) fn index(&mut self, error: i64, since: i32) -> i64 {
         let is_right = error.unsigned_abs() <= TOLERANCE;
-        if is_right && self.retained == Trust::REFERENCED && self.index == Index::Right {
+        if is_right && self.trust.has(Trust::REFERENCED) && self.unknown == 0 && self.index == Index::Right {
             self.since = since;
             return 0;
         }
@@ -169,13 +161,13 @@ impl Reference {
     fn doubtful_index(&mut self, error: i64, since: i32) -> i64 {
         let apart = self.since.wrapping_sub(since).unsigned_abs();
         self.since = since;
-        let is_first = !core::mem::replace(&mut self.trust.referenced, true);
+        let is_first = !self.trust.has(Trust::REFERENCED);
+        self.trust.flags |= Trust::REFERENCED;
         let is_right = error.unsigned_abs() <= TOLERANCE;
         let is_believed = is_first || is_right || self.agrees(error, apart);
         if is_believed {
             self.index = Index::Right;
-            self.trust.doubted = false;
-            self.trust.lost &= !self.marks.suffice;
+            self.trust.users = if self.marks.suffice { 0 } else { self.trust.lost() };
         } else if self.is_another(apart) || !matches!(self.index, Index::Elsewhere(_)) {
             self.index = Index::Elsewhere(error);
         }
@@ -183,15 +175,16 @@ impl Reference {
         if is_first || (is_believed && !is_right) { error.wrapping_neg() } else { 0 }
     }
 
-    /// Takes a preset: the position is known, whatever was wrong before. Returns the steps by which to correct the
-    /// count.
-    pub(super) fn preset(&mut self) -> i64 {
+    /// Takes a preset of one user: its position is known, whatever was wrong before. What was wrong until now stays so
+    /// for the other users. Returns the steps by which to correct the count.
+    pub(super) fn preset(&mut self, user: u8) -> i64 {
         let correction = self.correction();
         if self.index == Index::Missing {
             self.since = 0;
         }
+        self.trust = self.trust();
         self.index = Index::Right;
-        (self.trust.lost, self.trust.doubted) = (false, false);
+        self.trust.users &= !(user | user << 4);
         self.settle();
         correction
     }
@@ -217,17 +210,17 @@ impl Reference {
 
     #[inline(never)]
     fn settle(&mut self) {
-        let Trust { referenced, lost, doubted } = self.trust;
-        let is_missed = self.marks.is_used && !referenced;
+        let referenced = self.trust.has(Trust::REFERENCED);
+        let Marks { is_used, from_start, users, .. } = self.marks;
         let is_wrong = self.index != Index::Right;
+        self.unknown = if is_wrong { ALL } else { self.trust.unknown() };
+        let (lost, doubted) = (self.trust.users & users != 0, self.trust.users >> 4 & users != 0);
         let bit = |set: bool, bits: u8| if set { bits } else { 0 };
-        self.state = bit(is_missed, SENSOR_UNREFERENCED)
-            | bit(lost, SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR)
-            | bit(doubted, SENSOR_POSITION_ERROR)
+        self.state = bit(lost || (is_used && !referenced), SENSOR_UNREFERENCED)
+            | bit((lost && !from_start) || doubted, SENSOR_POSITION_ERROR)
             | bit(is_wrong, SENSOR_INDEX | SENSOR_POSITION_ERROR);
-        self.retained = Trust { doubted: doubted || is_wrong, ..self.trust }.bits();
         // A missing index stays missing until it comes.
-        let is_due = self.marks.is_used && referenced && self.index != Index::Missing;
+        let is_due = is_used && referenced && self.index != Index::Missing;
         let turn = self.marks.turn.filter(|_| is_due).map_or(u32::MAX, NonZeroU32::get);
         self.too_many = turn.saturating_add(turn / 4).saturating_add(4);
     }
@@ -241,12 +234,12 @@ mod tests {
     const BAD: u8 = SENSOR_INDEX | SENSOR_POSITION_ERROR;
 
     fn marks() -> Marks {
-        Marks { is_used: true, turn: NonZeroU32::new(4096), suffice: false }
+        Marks { is_used: true, turn: NonZeroU32::new(4096), suffice: false, from_start: false, users: 1 }
     }
 
     /// A reference that has seen its index.
     fn seen() -> Reference {
-        Reference::new(marks(), Trust { referenced: true, ..Trust::default() })
+        Reference::new(marks(), Trust { users: 0, flags: Trust::REFERENCED })
     }
 
     #[test]
@@ -261,7 +254,7 @@ mod tests {
             assert_eq!((reference.index(1, 0), reference.state()), (0, 0), "back in its place");
             reference.moved(sign * 2 * TURN);
             assert_eq!(reference.state(), BAD, "and missed again");
-            assert_eq!((reference.preset(), reference.state()), (0, 0));
+            assert_eq!((reference.preset(ALL), reference.state()), (0, 0));
             reference.moved(sign * 2 * TURN);
             assert_eq!(reference.state(), BAD, "a preset does not bring it back");
         }
@@ -317,8 +310,8 @@ mod tests {
         reference.lose();
         reference.index(0, 0);
         assert_eq!(reference.state(), SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR);
-        assert_ne!(reference.trust() & Trust::LOST, 0);
-        reference.preset();
+        assert_eq!(reference.trust().lost(), ALL);
+        reference.preset(ALL);
         assert_eq!(reference.state(), 0);
         let mut reference = Reference::new(Marks { suffice: true, ..marks() }, Trust::default());
         reference.lose();

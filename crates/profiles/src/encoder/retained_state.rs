@@ -6,8 +6,7 @@
 //! there was a position and that it is lost.
 
 use super::SensorType;
-use super::input::{LastPosition, StartPosition};
-use super::reference::Trust;
+use super::trust::Trust;
 use crate::board::{POSITION_RECORD_WORDS, RETAINED_WORDS, Retained};
 
 /// Milliseconds in a tenth of an hour.
@@ -47,41 +46,23 @@ impl OperatingTime {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RetainedChannel {
     /// Code of the sensor's type, 0 for a channel that has no position.
-    kind: u8,
+    pub(super) kind: u8,
     /// Steps per turn of a shaft, nm per step of a linear encoder.
-    resolution: u32,
-    total: i64,
-    trust: Trust,
-    /// The code may have wrapped, so the reading alone does not tell the position, though the sensor is absolute.
-    needs_memory: bool,
+    pub(super) resolution: u32,
+    pub(super) total: i64,
+    pub(super) trust: Trust,
 }
 
 impl RetainedChannel {
-    #[inline]
-    pub(super) fn new(kind: SensorType, resolution: u32, last: LastPosition) -> RetainedChannel {
-        let LastPosition { total, trust, needs_memory } = last;
-        RetainedChannel { kind: kind.code(), resolution, total, trust, needs_memory }
+    /// A channel that has lost its position with the memory.
+    fn forgotten(needs_memory: bool) -> RetainedChannel {
+        let flags = if needs_memory { Trust::NEEDS_MEMORY } else { 0 };
+        RetainedChannel { trust: Trust { flags, ..Trust::NONE }, ..RetainedChannel::default() }
     }
 
-    /// A channel that has no position yet or, with `lost`, one that has lost its position.
-    pub(super) fn unread((lost, needs_memory): (bool, bool)) -> RetainedChannel {
-        let trust = Trust { lost, ..Trust::default() };
-        RetainedChannel { trust, needs_memory, ..RetainedChannel::default() }
-    }
-
-    /// The retained knowledge of this sensor: none for another sensor, or for a type that does not continue from its
-    /// last position.
-    pub(super) fn start_position(&self, kind: SensorType, resolution: u32) -> StartPosition {
-        let Trust { lost, .. } = self.trust;
-        if self.kind == 0 {
-            return StartPosition { last: None, lost: lost && (kind.is_counted() || self.needs_memory) };
-        }
-        let is_same = (self.kind, self.resolution) == (kind.code(), resolution);
-        let last = LastPosition { total: self.total, trust: self.trust, needs_memory: self.needs_memory };
-        StartPosition {
-            last: (is_same && (kind.is_retained() || self.needs_memory)).then_some(last),
-            lost: !is_same && kind.is_counted(),
-        }
+    /// Whether a sensor of this type has left the state.
+    pub(super) fn is_of(&self, kind: SensorType, resolution: u32) -> bool {
+        (self.kind, self.resolution) == (kind.code(), resolution)
     }
 }
 
@@ -157,7 +138,7 @@ impl PositionRecord {
         let RetainedState { channels: [first, second], operating_time } = RetainedState::from_words(retained);
         PositionRecord {
             tenths: operating_time.tenths,
-            needs_memory: [first.needs_memory, second.needs_memory],
+            needs_memory: [first, second].map(|channel| channel.trust.has(Trust::NEEDS_MEMORY)),
         }
     }
 
@@ -186,10 +167,7 @@ impl PositionRecord {
 
     fn retained_state(self) -> RetainedState {
         let operating_time = OperatingTime { tenths: self.tenths, millis: 0 };
-        RetainedState {
-            channels: self.needs_memory.map(|needs| RetainedChannel::unread((true, needs))),
-            operating_time,
-        }
+        RetainedState { channels: self.needs_memory.map(RetainedChannel::forgotten), operating_time }
     }
 }
 
@@ -227,45 +205,31 @@ impl RetainedState {
     }
 }
 
+/// Marks the layout of the words: words of another layout say nothing about the position.
+const LAYOUT: u8 = 2;
+
 impl RetainedChannel {
     /// Words of the stored form.
     pub(super) const WORDS: usize = CHANNEL;
 
-    #[inline(never)]
-    pub(super) fn to_words(self) -> [u32; CHANNEL] {
-        stored_form(self.kind, self.resolution, self.total, self.trust.bits(), self.needs_memory)
-    }
-
-    /// The stored form of a position.
+    /// The stored form.
     #[inline]
-    pub(super) fn words(
-        kind: SensorType,
-        resolution: u32,
-        total: i64,
-        trust: u8,
-        needs_memory: bool,
-    ) -> [u32; CHANNEL] {
-        stored_form(kind.code(), resolution, total, trust, needs_memory)
+    pub(super) fn to_words(self) -> [u32; CHANNEL] {
+        let Trust { users, flags } = self.trust;
+        let [total, total_high] = halves(self.total.cast_unsigned());
+        [u32::from_le_bytes([self.kind, users, flags, LAYOUT]), self.resolution, total, total_high]
     }
 
+    #[inline(never)]
     fn from_words(words: &[u32; CHANNEL]) -> RetainedChannel {
-        let [flags, resolution, total, total_high] = *words;
-        let [kind, trust, needs_memory, _] = flags.to_le_bytes();
-        RetainedChannel {
-            kind,
-            resolution,
-            total: whole([total, total_high]).cast_signed(),
-            trust: Trust::from_bits(trust),
-            needs_memory: needs_memory != 0,
+        let [first, resolution, total, total_high] = *words;
+        let [kind, users, flags, layout] = first.to_le_bytes();
+        if first != 0 && layout != LAYOUT {
+            return RetainedChannel::forgotten(true);
         }
+        let total = whole([total, total_high]).cast_signed();
+        RetainedChannel { kind, resolution, total, trust: Trust { users, flags } }
     }
-}
-
-#[inline]
-fn stored_form(kind: u8, resolution: u32, total: i64, trust: u8, needs_memory: bool) -> [u32; CHANNEL] {
-    let flags = u32::from_le_bytes([kind, trust, needs_memory.into(), 0]);
-    let [total, total_high] = halves(total.cast_unsigned());
-    [flags, resolution, total, total_high]
 }
 
 /// The low and the high word.
@@ -287,9 +251,9 @@ mod tests {
     prop_compose! {
         fn any_channel()(
             (kind, resolution, total) in any::<(u8, u32, i64)>(),
-            (referenced, lost, doubted, needs_memory) in any::<(bool, bool, bool, bool)>(),
+            (users, flags) in any::<(u8, u8)>(),
         ) -> RetainedChannel {
-            RetainedChannel { kind, resolution, total, trust: Trust { referenced, lost, doubted }, needs_memory }
+            RetainedChannel { kind, resolution, total, trust: Trust { users, flags } }
         }
     }
 

@@ -153,6 +153,13 @@ impl Scale {
         self.reversed
     }
 
+    /// Whether the position is the same after so many native steps, 2^32 at most.
+    pub(super) fn repeats_after(&self, steps: u64) -> bool {
+        // A turn and a range have at most 2^32 steps each, so their product fits 64 bits.
+        let range = NonZeroU64::from(self.turn).saturating_mul(self.range);
+        steps.saturating_mul(self.units.into()) % range == 0
+    }
+
     /// Whether both scales count in the same units.
     #[must_use]
     pub fn is_like(&self, other: &Scale) -> bool {

@@ -1,6 +1,6 @@
 //! Alarms, warnings and fault conditions: objects 6503h to 6506h.
 
-use super::input::{SENSOR_NO_SIGNAL, SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED};
+use super::input::{SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED};
 use super::{ChannelValues, OperatingTime};
 use crate::board::Board;
 
@@ -200,9 +200,9 @@ impl Supervision {
 /// Whether a sensor does not answer, and whether a sensor answers with a wrong position.
 #[inline(never)]
 fn errors(channels: &[ChannelValues; 2]) -> (bool, bool) {
-    let broken = SENSOR_NO_SIGNAL | SENSOR_POSITION_ERROR;
-    let is = |bits: u8| channels.iter().any(|channel| channel.sensor_state & broken == bits);
-    (is(broken), is(SENSOR_POSITION_ERROR))
+    let is_wrong =
+        |channel: &ChannelValues| !channel.is_broken && channel.sensor_state & SENSOR_POSITION_ERROR != 0;
+    (channels.iter().any(|channel| channel.is_broken), channels.iter().any(is_wrong))
 }
 
 fn sensors(channels: &[ChannelValues; 2]) -> u8 {

@@ -64,10 +64,15 @@ impl Tracker {
     /// Takes a reading; returns the steps moved.
     pub fn follow(&mut self, word: u32) -> i32 {
         let moved = self.distance(word);
+        self.advance(word, moved);
+        moved
+    }
+
+    /// Takes a reading after a movement by `moved` steps, which may be longer than half of the counter's range.
+    pub(super) fn advance(&mut self, word: u32, moved: i32) {
         self.word = word;
         self.count = self.count.wrapping_add_signed(moved);
         self.correct(moved.into());
-        moved
     }
 
     /// Corrects the position without a movement.

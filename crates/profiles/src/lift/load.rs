@@ -51,12 +51,14 @@ pub struct Parameters {
     pub filter_type: u8,
     /// Filter constant, as in 61A1h of CiA 404.
     pub filter_constant: u8,
-    /// Two different pressures; with two equal ones the load measuring unit is off.
+    /// Two different pressures; with two equal ones the unit measures no load, as with a broken sensor.
     pub points: [Point; 2],
     /// Added to the load in kg.
     pub offset: f32,
     /// Load signalling limits (6483h) in kg: zero, half, full, overload.
     pub limits: [u16; 4],
+    /// Hysteresis of the signals (2310h:3) in kg.
+    pub hysteresis: u16,
 }
 
 impl Default for Parameters {
@@ -69,6 +71,7 @@ impl Default for Parameters {
             points: [Point { pressure: 0.0, load: 0.0 }, Point { pressure: 1.0e6, load: 1000.0 }],
             offset: 0.0,
             limits: [0; 4],
+            hysteresis: 10,
         }
     }
 }
@@ -111,6 +114,7 @@ pub struct LoadUnit {
     line: Option<(f32, f32)>,
     filter: Filter,
     recovery: Recovery,
+    signals: u8,
 }
 
 impl LoadUnit {
@@ -120,7 +124,7 @@ impl LoadUnit {
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> LoadUnit {
         let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
         let recovery = Recovery::default();
-        LoadUnit { chip, parameters: *parameters, line: parameters.line(), filter, recovery }
+        LoadUnit { chip, parameters: *parameters, line: parameters.line(), filter, recovery, signals: 0 }
     }
 
     /// Takes over parameters; they act from the next sample on. The filter restarts only if its own parameters have
@@ -129,30 +133,25 @@ impl LoadUnit {
     pub fn apply(&mut self, parameters: &Parameters) {
         let fresh = LoadUnit::new(self.chip, parameters);
         let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };
-        *self = LoadUnit { filter, recovery: self.recovery, ..fresh };
+        *self = LoadUnit { filter, recovery: self.recovery, signals: self.signals, ..fresh };
     }
 
     /// Processes the sums of one millisecond.
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
-        let Some((factor, constant)) = self.line else { return Snapshot::default() };
         let p = &self.parameters;
-        let is_bad = p.transducer.pressure.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
+        let is_bad =
+            self.line.is_none() || p.transducer.pressure.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
         let is_broken = self.recovery.next(is_bad, &mut self.filter);
         let kelvin = p.transducer.temperature.temperature(raw, self.chip);
         let pascal = self.filter.next(p.transducer.pressure.pressure(raw.ratio(), kelvin));
-        if is_broken {
-            let (load, measured) = (u16::MAX, f32::from(u16::MAX));
-            return Snapshot {
-                load,
-                measured,
-                signals: signals(load, &p.limits),
-                offset: p.offset,
-                is_broken,
-            };
-        }
-        let measured = pascal * factor + constant;
+        let measured = match self.line {
+            Some((factor, constant)) if !is_broken => pascal * factor + constant,
+            _ => f32::from(u16::MAX),
+        };
         let load = rounded(measured);
-        Snapshot { load, measured, signals: signals(load, &p.limits), offset: p.offset, is_broken }
+        let found = signals(load, &p.limits, p.hysteresis, self.signals);
+        self.signals = found | if is_broken { OVERLOAD } else { 0 };
+        Snapshot { load, measured, signals: self.signals, offset: p.offset, is_broken }
     }
 }
 
@@ -162,9 +161,9 @@ fn rounded(load: f32) -> u16 {
     (load + 0.5) as u16
 }
 
-/// Object 6482h for a load.
+/// Object 6482h for a load, after the signals `before`: a signal ends when the load is back by the hysteresis.
 #[must_use]
-pub fn signals(load: u16, limits: &[u16; 4]) -> u8 {
+pub fn signals(load: u16, limits: &[u16; 4], hysteresis: u16, before: u8) -> u8 {
     let mut used = limits.iter().filter(|limit| **limit != 0);
     let is_inverted = match (used.next(), used.next_back()) {
         (Some(first), Some(last)) => first > last,
@@ -173,7 +172,9 @@ pub fn signals(load: u16, limits: &[u16; 4]) -> u8 {
     let bits = [ZERO_LOAD, HALF_LOAD, FULL_LOAD, OVERLOAD];
     limits.iter().zip(bits).filter(|(limit, _)| **limit != 0).fold(0, |signals, (limit, bit)| {
         let is_above = (bit == ZERO_LOAD) == is_inverted;
-        let is_set = if is_above { load > *limit } else { load < *limit };
+        let back = if before & bit == 0 { 0 } else { hysteresis };
+        let is_set =
+            if is_above { load > limit.saturating_sub(back) } else { load < limit.saturating_add(back) };
         if is_set { signals | bit } else { signals }
     })
 }
@@ -192,7 +193,13 @@ mod tests {
     fn hydraulic() -> Parameters {
         // An empty car at 20 bar would be beyond the range: 2 bar empty, 6 bar with 800 kg.
         let points = [Point { pressure: 2.0e5, load: 0.0 }, Point { pressure: 6.0e5, load: 800.0 }];
-        Parameters { filter_type: 0, points, limits: [50, 300, 600, 660], ..Parameters::default() }
+        Parameters {
+            filter_type: 0,
+            points,
+            limits: [50, 300, 600, 660],
+            hysteresis: 0,
+            ..Parameters::default()
+        }
     }
 
     #[test]
@@ -233,24 +240,49 @@ mod tests {
             (661, HALF_LOAD | FULL_LOAD | OVERLOAD),
             (u16::MAX, HALF_LOAD | FULL_LOAD | OVERLOAD),
         ] {
-            assert_eq!(signals(load, &[50, 300, 600, 660]), expected, "{load}");
+            assert_eq!(signals(load, &[50, 300, 600, 660], 0, 0), expected, "{load}");
         }
     }
 
     #[test]
+    fn a_signal_ends_when_the_load_is_back_by_the_hysteresis() {
+        let limits = [50, 300, 600, 650];
+        let mut signals_of = 0;
+        for (load, is_set) in
+            [(650, false), (651, true), (645, true), (641, true), (640, false), (650, false)]
+        {
+            signals_of = signals(load, &limits, 10, signals_of);
+            assert_eq!(signals_of & OVERLOAD != 0, is_set, "{load}");
+        }
+        for (load, is_set) in [(49, true), (59, true), (60, false), (50, false)] {
+            signals_of = signals(load, &limits, 10, signals_of);
+            assert_eq!(signals_of & ZERO_LOAD != 0, is_set, "{load}");
+        }
+        // 650.5 kg with 5 kg of noise.
+        let noisy = (0..1000_u16).map(|n| 646 + n * 7 % 11);
+        let overloads = noisy.map(|load| {
+            signals_of = signals(load, &limits, 10, signals_of);
+            signals_of & OVERLOAD
+        });
+        let mut changes: Vec<u8> = overloads.collect();
+        changes.dedup();
+        assert!(changes.len() <= 2, "{changes:?}");
+    }
+
+    #[test]
     fn a_limit_of_zero_switches_its_bit_off() {
-        assert_eq!(signals(0, &[0; 4]), 0);
-        assert_eq!(signals(u16::MAX, &[0; 4]), 0);
-        assert_eq!(signals(1000, &[50, 0, 0, 660]), OVERLOAD);
-        assert_eq!(signals(10, &[50, 0, 0, 0]), ZERO_LOAD, "one limit is in no order");
-        assert_eq!(signals(700, &[0, 0, 0, 660]), OVERLOAD);
-        assert_eq!(signals(10, &[50, 0, 0, 50]), ZERO_LOAD, "equal limits do not fall");
+        assert_eq!(signals(0, &[0; 4], 0, 0), 0);
+        assert_eq!(signals(u16::MAX, &[0; 4], 0, 0), 0);
+        assert_eq!(signals(1000, &[50, 0, 0, 660], 0, 0), OVERLOAD);
+        assert_eq!(signals(10, &[50, 0, 0, 0], 0, 0), ZERO_LOAD, "one limit is in no order");
+        assert_eq!(signals(700, &[0, 0, 0, 660], 0, 0), OVERLOAD);
+        assert_eq!(signals(10, &[50, 0, 0, 50], 0, 0), ZERO_LOAD, "equal limits do not fall");
     }
 
     #[test]
     fn limits_that_fall_are_those_of_a_value_that_falls() {
         for (load, expected) in [(1000, ZERO_LOAD), (900, 0), (500, 0), (399, HALF_LOAD), (99, 14)] {
-            assert_eq!(signals(load, &[900, 400, 200, 100]), expected, "{load}");
+            assert_eq!(signals(load, &[900, 400, 200, 100], 0, 0), expected, "{load}");
         }
     }
 
@@ -296,15 +328,23 @@ mod tests {
         }
     }
 
+    /// A unit without a characteristic cannot say that there is no overload.
     #[test]
-    fn equal_points_are_no_unit() {
+    fn equal_points_are_a_broken_sensor() {
         let points = [Point { pressure: 1.0, load: 0.0 }, Point { pressure: 1.0, load: 100.0 }];
         let parameters = Parameters { points, ..hydraulic() };
         assert!(!parameters.is_calibrated());
-        assert_eq!(
-            LoadUnit::new(ChipThermometer::UNKNOWN, &parameters).sample(&raw(5.0e5)),
-            Snapshot::default()
-        );
+        let snapshot = LoadUnit::new(ChipThermometer::UNKNOWN, &parameters).sample(&raw(5.0e5));
+        assert_eq!((snapshot.load, snapshot.is_broken), (u16::MAX, true));
+        assert_eq!(snapshot.signals & OVERLOAD, OVERLOAD);
+    }
+
+    #[test]
+    fn a_broken_sensor_is_an_overload_without_limits_too() {
+        let parameters = Parameters::default();
+        let snapshot = LoadUnit::new(ChipThermometer::UNKNOWN, &parameters)
+            .sample(&RawSample { pressure: 0, ..raw(0.0) });
+        assert_eq!((snapshot.load, snapshot.signals & OVERLOAD), (u16::MAX, OVERLOAD));
     }
 
     #[test]

@@ -34,6 +34,8 @@ pub struct Calls {
     has_lost: bool,
     /// The buttons whose states are to be sent.
     asked: [bool; BUTTONS],
+    /// The buttons that were last sent as pressed.
+    told: [bool; BUTTONS],
 }
 
 impl Calls {
@@ -58,6 +60,12 @@ impl Calls {
         if let Some(asked) = self.asked.get_mut(button) {
             *asked = true;
         }
+    }
+
+    /// Whether a contact is to be sent, of a button that `is_used`. A button that is no longer used is released once.
+    pub(crate) fn tell(&mut self, contact: Contact, is_used: bool) -> bool {
+        let Some(told) = self.told.get_mut(usize::from(contact.button)) else { return false };
+        core::mem::replace(told, contact.is_pressed && is_used) || is_used
     }
 
     /// The next call to be sent.

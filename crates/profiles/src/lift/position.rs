@@ -14,8 +14,9 @@ use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{
-    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Module, RetainedState, SENSOR_HELD,
-    SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_POSITION_ERROR, Sensor, Start, area_state,
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Module, RetainedState, SENSOR_ALARM,
+    SENSOR_HELD, SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_TOO_FAST, SENSOR_UNREFERENCED, Sensor, Start,
+    area_state,
 };
 
 /// Number of position units in a device.
@@ -70,7 +71,12 @@ pub struct UnitParameters {
     pub offset: i32,
     /// Limits of the position (63B4h, 63B8h), compared like the work area of CiA 406.
     pub limits: Area,
+    /// Number of presets (2306h); 0 before the first one, [`NO_OFFSET`] when the offset has lost its meaning since.
+    pub references: u8,
 }
+
+/// Number of presets of a unit whose offset has lost its meaning: its sensor or its units have changed.
+pub const NO_OFFSET: u8 = u8::MAX;
 
 /// The parameters of the position units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +96,13 @@ pub struct Parameters {
 impl Default for UnitParameters {
     /// An unused unit.
     fn default() -> UnitParameters {
-        UnitParameters { source: None, operating: 0, offset: 0, limits: Area { low: 0, high: i32::MAX } }
+        UnitParameters {
+            source: None,
+            operating: 0,
+            offset: 0,
+            limits: Area { low: 0, high: i32::MAX },
+            references: 0,
+        }
     }
 }
 
@@ -151,16 +163,29 @@ impl Parameters {
             resolution: own.resolution,
             counted: own.counted,
             fastest: own.fastest,
-            references: own.references,
+            users: 0,
             ..ChannelParameters::default()
         };
+        let mut channels = self.sensors.channels.map(channel);
+        let [first, second] = &mut channels;
+        for (number, unit) in self.units.iter().enumerate() {
+            let channel = match unit.source {
+                None => continue,
+                Some(Source::First) => &mut *first,
+                Some(Source::Second) => &mut *second,
+            };
+            channel.users |= 1 << number;
+            if let Some(references) = channel.references.get_mut(number) {
+                *references = if unit.references == NO_OFFSET { 0 } else { unit.references };
+            }
+        }
         encoder::Parameters {
             operating: 0,
             travel: Some(self.travel),
             // Steps in nm and in 0.01 mm/s.
             step: u32::from(self.position_step.get()) * 10_000,
             speed_step: u32::from(self.speed_step.get()) * 10,
-            channels: self.sensors.channels.map(channel),
+            channels,
             module: Module::default(),
             ..self.sensors
         }
@@ -208,6 +233,12 @@ struct Unit {
     offset: i32,
     range: i64,
     limits: Area,
+    /// The bit of the unit among the users of its sensor.
+    user: u8,
+    /// Whether nobody has said where the unit is.
+    needs_preset: bool,
+    /// An index says where the unit is.
+    has_mark: bool,
     /// The part of the values that depends on parameters alone.
     fixed: UnitValues,
 }
@@ -224,7 +255,19 @@ impl Unit {
             ..UnitValues::default()
         };
         let (source, range) = (own.source?, all.range(number)?);
-        Some(Unit { source, is_inverted, offset: own.offset, range, limits: own.limits, fixed })
+        let kind = sensor.kind;
+        let has_origin = kind.is_absolute() && !kind.is_counted();
+        Some(Unit {
+            source,
+            is_inverted,
+            offset: own.offset,
+            range,
+            limits: own.limits,
+            user: 1 << number,
+            needs_preset: own.references == NO_OFFSET || (own.references == 0 && !has_origin),
+            has_mark: own.references == 0 && kind.is_linear() && !kind.is_absolute() && sensor.index,
+            fixed,
+        })
     }
 
     #[inline(never)]
@@ -240,18 +283,24 @@ impl Unit {
             position,
             reading: if channel.reading == channel.position { position } else { at(channel.reading) },
             speed: if self.is_inverted { channel.speed.saturating_neg() } else { channel.speed },
-            state: area_state(&self.limits, &Module::default(), position, 0) | known(channel),
+            state: area_state(&self.limits, &Module::default(), position, self.range, 0)
+                | self.known(channel),
             warnings,
             ..self.fixed
         }
     }
-}
 
-fn known(channel: &ChannelValues) -> u8 {
-    let unknown = if channel.sensor_state & SENSOR_HELD == 0 { 0 } else { UNKNOWN };
-    let is_read = channel.sensor_state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0;
-    let is_wrong = is_read && channel.sensor_state & SENSOR_POSITION_ERROR != 0;
-    unknown | if is_wrong { NOT_REFERENCED } else { 0 }
+    /// The bits of the state that say whether the position can be trusted.
+    fn known(&self, channel: &ChannelValues) -> u8 {
+        let state = channel.sensor_state;
+        let unknown = if state & SENSOR_HELD == 0 { 0 } else { UNKNOWN };
+        let is_read = state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0;
+        let is_marked = self.has_mark && state & SENSOR_UNREFERENCED == 0;
+        let is_wrong = channel.unknown & self.user != 0
+            || state & (SENSOR_ALARM | SENSOR_TOO_FAST) != 0
+            || (self.needs_preset && !is_marked);
+        unknown | if is_read && is_wrong { NOT_REFERENCED } else { 0 }
+    }
 }
 
 /// 63C0h: scaling (bit 2) is always on. The public text shows the direction in bit 0, 6380h has it in bit 3, so both
@@ -307,8 +356,8 @@ impl PositionUnits {
     /// Processes the readings of one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
         let encoder::Snapshot { channels, warnings, conditions, .. } = self.encoder.sample(raw);
-        let values =
-            |unit: Option<Unit>| unit.map(|unit| unit.values(&channels, warnings)).unwrap_or_default();
+        let absent = UnitValues { state: UNKNOWN, ..UnitValues::default() };
+        let values = |unit: Option<Unit>| unit.map_or(absent, |unit| unit.values(&channels, warnings));
         Snapshot { units: self.units.map(values), conditions }
     }
 

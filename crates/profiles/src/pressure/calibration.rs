@@ -84,6 +84,13 @@ impl PressureCalibration {
         self.start + (self.end - self.start) * ((ratio - self.zero.at(t)) / self.span.at(t))
     }
 
+    /// Whether the pressure depends on the temperature.
+    #[must_use]
+    pub fn has_drift(&self) -> bool {
+        let Polynomial { linear, quadratic, .. } = self.zero;
+        [linear, quadratic, self.span.linear, self.span.quadratic].iter().any(|drift| *drift != 0.0)
+    }
+
     /// Whether the ratio is outside the range of an intact sensor.
     #[must_use]
     pub fn is_break(&self, ratio: f32) -> bool {

@@ -10,6 +10,9 @@ pub const STATUS_ABOVE: u8 = 0x02;
 /// 6150h bit 2: a process value is below its span.
 pub const STATUS_BELOW: u8 = 0x04;
 
+/// 6150h bit 3: measured without the compensation for temperature that the calibration has.
+pub const STATUS_UNCOMPENSATED: u8 = 0x08;
+
 /// The span of a process value: outside of these limits the value is too low or too high.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span<T> {
@@ -83,6 +86,8 @@ pub struct ChannelValues {
     pub process_value32: i32,
     /// 6150h, status.
     pub status: u8,
+    /// The value comes from an intact sensor, whether or not every format can show it.
+    pub is_measured: bool,
 }
 
 /// A channel: its parameters and the state of its filter.
@@ -132,7 +137,8 @@ impl Channel {
             | p.span16.status(process_value16)
             | p.span32.status(process_value32);
         let status = spans | if valid && fits16(shifted) { 0 } else { STATUS_INVALID };
-        ChannelValues { field_value, process_value, process_value16, process_value32, status }
+        let is_measured = valid && process_value.abs() < f32::MAX;
+        ChannelValues { field_value, process_value, process_value16, process_value32, status, is_measured }
     }
 }
 
@@ -198,6 +204,7 @@ mod tests {
             process_value16: 275,
             process_value32: 275,
             status: 0,
+            is_measured: true,
         };
         assert_eq!(sample(&bar, 100_000.0), expected);
     }

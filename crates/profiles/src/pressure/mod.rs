@@ -17,7 +17,8 @@ pub mod objects;
 
 pub use calibration::{Polynomial, PressureCalibration};
 pub use channel::{
-    Channel, ChannelParameters, ChannelValues, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID, Span,
+    Channel, ChannelParameters, ChannelValues, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID,
+    STATUS_UNCOMPENSATED, Span,
 };
 pub use filter::Filter;
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};

@@ -1,7 +1,8 @@
 //! The transmitter: sensor, pressure channel, temperature channel.
 
 use super::{
-    Channel, ChannelParameters, ChannelValues, PressureCalibration, Span, TemperatureCalibration, Unit,
+    Channel, ChannelParameters, ChannelValues, PressureCalibration, STATUS_UNCOMPENSATED, Span,
+    TemperatureCalibration, Unit,
 };
 use crate::board::{ChipThermometer, Inputs, PowerOn, RawSample};
 use crate::profile::Chain;
@@ -114,6 +115,9 @@ impl Transmitter {
         let pressure = self.calibration.pressure.pressure(ratio, kelvin);
         let is_valid = !conditions.sensor_break && !conditions.pressure_rail;
         snapshot.pressure = self.pressure.sample(pressure, is_valid);
+        if kelvin.is_none() && self.calibration.pressure.has_drift() {
+            snapshot.pressure.status |= STATUS_UNCOMPENSATED;
+        }
         // A temperature that cannot be measured reads 0 K, as in a transmitter without a temperature sensor.
         snapshot.temperature = self.temperature.sample(kelvin.unwrap_or(0.0), !conditions.temperature_rail);
         snapshot.conditions = conditions;
@@ -268,6 +272,18 @@ mod tests {
                 temperature_rail: raw == no_temperature,
             };
             assert_eq!(snapshot.conditions, conditions);
+        }
+    }
+
+    #[test]
+    fn a_pressure_without_its_compensation_says_so() {
+        let no_temperature = RawSample { temperature: 0, ..GOOD };
+        for (drift, status) in [(0.0, 0), (2e-4, 1 << 3)] {
+            let mut parameters = Parameters::default();
+            parameters.calibration.pressure.zero.linear = drift;
+            let mut transmitter = Transmitter::new(CHIP, &parameters);
+            assert_eq!(transmitter.sample(&GOOD).pressure.status, 0);
+            assert_eq!(transmitter.sample(&no_temperature).pressure.status, status, "{drift}");
         }
     }
 

@@ -85,6 +85,11 @@ impl Bench {
         snapshot
     }
 
+    /// Rests until the shaft counts as being at rest.
+    pub(crate) fn rest(&mut self) {
+        (0..100).for_each(|_| _ = self.stay());
+    }
+
     /// A millisecond with this frame.
     pub(crate) fn receive(&mut self, frame: Option<SsiFrame>) -> Snapshot {
         self.raw.ssi = frame;

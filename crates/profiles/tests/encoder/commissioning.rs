@@ -145,3 +145,14 @@ fn too_fast_is_found() {
     bench.step(10_001);
     assert_eq!(progress(&mut bench), Progress::TooFast);
 }
+
+#[test]
+fn a_start_with_the_diagnostic_saved_is_no_fault() {
+    let mut bench = diagnosed(SensorType::MultiTurn);
+    (0..2).for_each(|_| _ = bench.receive(None));
+    (0..1001).for_each(|_| _ = bench.stay());
+    assert_eq!((progress(&mut bench), bench.stay().alarms), (Progress::GoodAtRest, 0));
+    let mut bench = diagnosed(SensorType::MultiTurn);
+    (0..20).for_each(|_| _ = bench.receive(None));
+    assert_eq!(bench.receive(None).channels[0].commissioning, Progress::BadReading, "no word at all");
+}

@@ -99,7 +99,7 @@ fn of_a_single_turn_encoder_the_bits_of_a_turn_count() {
 #[test]
 fn as_fast_as_the_sensor_is_not_too_fast() {
     for (kind, state) in
-        [(SensorType::MultiTurn, SENSOR_IMPLAUSIBLE), (SensorType::LinearIncremental, SENSOR_TOO_FAST)]
+        [(SensorType::MultiTurn, SENSOR_IMPLAUSIBLE), (SensorType::LinearIncrementalCounted, SENSOR_TOO_FAST)]
     {
         let mut parameters = Parameters { index: false, ..one(kind) };
         parameters.channels[0].fastest = 500;

@@ -32,6 +32,7 @@ fn counted_positions_go_on_where_they_were() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     (1..=20).for_each(|turns| _ = bench.go(turns * 5000));
+    bench.rest();
     let mut back = after_power_loss(&bench, 100_000);
     let values = back.first();
     assert_eq!((values.position, values.sensor_state), (100_000, 0), "and is still referenced");
@@ -55,6 +56,7 @@ fn what_is_not_counted_electronically_starts_afresh() {
 fn an_absolute_sensor_knows_what_happened_in_the_dark() {
     let mut bench = Bench::new(one(SensorType::SingleTurnCounted));
     (0..=20).for_each(|turns| _ = bench.go(turns * 3000));
+    bench.rest();
     for moved in [4000, -4000, 1, 0] {
         assert_eq!(i64::from(after_power_loss(&bench, 60_000 + moved).first().position), 60_000 + moved);
     }
@@ -65,8 +67,9 @@ fn an_incremental_sensor_notices_at_the_index_that_it_was_turned_in_the_dark() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     bench.go(5000);
+    bench.rest();
     let mut back = after_power_loss(&bench, 5300);
-    assert_eq!(back.first().position, 5000);
+    (0..10).for_each(|_| assert_eq!(back.first().position, 5000));
     let snapshot = back.go(8200);
     assert_eq!(
         (snapshot.channels[0].position, snapshot.alarms),
@@ -134,6 +137,7 @@ fn without_a_battery_a_position_is_right_or_says_that_it_is_lost() {
         back.preset(0, 600);
         let values = back.first();
         assert_eq!((values.position, values.sensor_state & SENSOR_POSITION_ERROR), (600, 0), "{kind:?}");
+        back.rest();
         let again = after_power_loss(&back, 86_100).first();
         assert_eq!(again.sensor_state & SENSOR_POSITION_ERROR, 0, "and stays known with a battery");
     }
@@ -208,4 +212,66 @@ fn operating_time_goes_on() {
     let mut back = after_power_loss(&bench, 0);
     (0..359_998).for_each(|_| _ = back.stay());
     assert_eq!(back.stay().operating_time, 2, "the millisecond counts too");
+}
+
+/// The last sample saw the shaft turn, so nobody knows how far it has turned since.
+#[test]
+fn a_shaft_that_turns_at_a_reset_has_lost_its_turns() {
+    for (kind, is_known) in [
+        (SensorType::MultiTurn, true),
+        (SensorType::LinearAbsolute, true),
+        (SensorType::SingleTurnCounted, false),
+        (SensorType::IncrementalCounted, false),
+        (SensorType::LinearIncrementalCounted, false),
+        (SensorType::LinearCyclic, false),
+    ] {
+        let mut bench = Bench::new(one(kind));
+        (0..=20).for_each(|turns| _ = bench.go(turns * 500));
+        let mut back = after_power_loss(&bench, 10_000 + 3 * 8192);
+        for _ in 0..3 {
+            assert_eq!(back.first().sensor_state & SENSOR_POSITION_ERROR == 0, is_known, "{kind:?}");
+            back.rest();
+            back = after_power_loss(&back, 10_000 + 3 * 8192);
+        }
+        back.preset(0, 7);
+        back.rest();
+        assert_eq!(back.first().sensor_state & SENSOR_POSITION_ERROR, 0, "{kind:?} after a preset");
+    }
+}
+
+#[test]
+fn a_shaft_that_turns_right_after_a_start_has_turned_before() {
+    for (millis, is_known) in [(0, false), (8, false), (11, true)] {
+        let mut bench = Bench::new(one(SensorType::IncrementalCounted));
+        bench.rest();
+        let mut back = after_power_loss(&bench, 0);
+        (0..=millis).for_each(|_| _ = back.stay());
+        back.step(2);
+        assert_eq!(back.first().sensor_state & SENSOR_POSITION_ERROR == 0, is_known, "{millis} ms");
+    }
+}
+
+/// What a firmware before this layout has retained says nothing about the position.
+#[test]
+fn words_of_an_older_layout_are_a_lost_position() {
+    let mut words = RetainedState::default().to_words();
+    words[..4].copy_from_slice(&[u32::from_le_bytes([5, 2, 0, 0]), 4096, 1000, 0]);
+    let start = Start::Retained(RetainedState::from_words(&words));
+    let values = Bench::started(one(SensorType::IncrementalCounted), start, 0).first();
+    assert_ne!(values.sensor_state & SENSOR_POSITION_ERROR, 0);
+}
+
+/// The power fails again and again while the node starts.
+#[test]
+fn a_shaft_at_rest_keeps_its_position_through_starts_that_are_cut_short() {
+    for kind in [SensorType::IncrementalCounted, SensorType::SingleTurnCounted] {
+        let mut bench = Bench::new(one(kind));
+        (0..=20).for_each(|turns| _ = bench.go(turns * 500));
+        bench.rest();
+        for millis in [1, 5, 50] {
+            bench = after_power_loss(&bench, 10_000);
+            (0..millis).for_each(|_| assert_eq!(bench.first().sensor_state & SENSOR_POSITION_ERROR, 0));
+        }
+        assert_eq!(bench.first().position, 10_000);
+    }
 }

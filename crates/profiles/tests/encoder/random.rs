@@ -25,7 +25,8 @@ fn any_channel() -> impl Strategy<Value = ChannelParameters> {
                 cams: Cams { cams, enable, polarity },
                 area: Area { low, high },
                 offset: low,
-                references: count,
+                users: 1,
+                references: [count; 4],
             }
         },
     )

@@ -1,10 +1,11 @@
 //! Disturbed readings, alarms, warnings, and faults that are reported as emergencies.
 
-use profiles::board::{Board, SsiFrame};
+use profiles::board::{Board, Retained, SsiFrame};
 use profiles::encoder::{
-    ALARM_POSITION, Coding, Conditions, Format, Parity, SENSOR_IMPLAUSIBLE, SENSOR_NO_SIGNAL, SENSOR_PARITY,
-    SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SUPPORTED_WARNINGS, SensorType, Snapshot, WARNING_BATTERY,
-    WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
+    ALARM_COMMISSIONING, ALARM_POSITION, Coding, Command, Conditions, Format, Parity, SENSOR_IMPLAUSIBLE,
+    SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SUPPORTED_WARNINGS, SensorType,
+    Snapshot, Start, WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE,
+    WARNING_WATCHDOG,
 };
 
 use crate::bench::{Bench, delivered, frame, one, two};
@@ -109,17 +110,17 @@ fn a_jump_is_not_taken_over_until_it_is_back_or_the_position_is_preset() {
 /// With the parameters as delivered, half a turn in a millisecond is implausible for any sensor.
 #[test]
 fn the_fastest_movement_follows_from_the_resolution() {
-    for (steps, fastest) in [(13, 1638), (10, 204), (17, 26_214), (2, 1)] {
+    for (steps, fastest) in [(13, 1690), (10, 211), (17, 27_034), (2, 1)] {
         let mut parameters = delivered(SensorType::MultiTurn);
         parameters.format = Format::new(8, steps, Coding::Gray, false, Parity::None).unwrap();
         let sensor = parameters.sensors().next().unwrap();
-        assert_eq!(sensor.fastest, fastest, "12,000 rpm of {steps} bits");
+        assert_eq!(sensor.fastest, fastest, "12,000 rpm of {steps} bits and 3 %");
         let mut bench = Bench::new(parameters);
         bench.stay();
         assert_eq!(bench.go(1 << (steps - 1)).channels[0].sensor_state, SENSOR_IMPLAUSIBLE);
     }
     let rod = delivered(SensorType::LinearAbsolute).sensors().next().unwrap();
-    assert_eq!(rod.fastest, 20_000_000 / 4096, "20 m/s");
+    assert_eq!(rod.fastest, 4883 + 4883 / 32, "20 m/s and 3 %");
 }
 
 /// Movement too fast for the sensor is an error until the index confirms the count.
@@ -203,4 +204,88 @@ fn a_memory_error_of_the_board_is_reported() {
     let mut bench = Bench::new(one(SensorType::MultiTurn));
     bench.raw.board.memory_error = true;
     assert!(bench.stay().conditions.memory);
+}
+
+/// The stated maximum, 12,000 rpm, is 1638.4 steps of 13 bits in a millisecond.
+#[test]
+fn the_stated_maximum_speed_is_read_at_its_value_at_a_start_and_both_ways() {
+    for (sign, kind) in [1, -1].into_iter().flat_map(|sign| {
+        [SensorType::MultiTurn, SensorType::SingleTurnCounted, SensorType::LinearAbsolute]
+            .map(|kind| (sign, kind))
+    }) {
+        let per_second = if kind.is_linear() { 20_000_000_000 / 4096 } else { 200 * 8192 };
+        let mut bench = Bench::new(delivered(kind));
+        // The second reading comes 2 % late.
+        let at = |micros: i64| sign * per_second * micros / 1_000_000;
+        bench.go(at(0));
+        for n in 1..500 {
+            let values = bench.go(at(1000 * n + 20)).channels[0];
+            assert_eq!(values.sensor_state, 0, "{kind:?} ms {n}");
+        }
+    }
+}
+
+/// A rejected reading of a sensor whose code is enough is believed on request, and by a reset.
+#[test]
+fn a_sensor_that_is_well_again_is_believed_on_request() {
+    let jumped = || {
+        let mut bench = Bench::new(delivered(SensorType::MultiTurn));
+        bench.go(100_000);
+        (0..200).for_each(|_| _ = bench.go(100_000 + 600_000));
+        assert_eq!(bench.first().position, 100_000);
+        bench
+    };
+    let acknowledge = |bench: &mut Bench, value| {
+        bench.change(|parameters| {
+            parameters.acknowledge = Command { value, count: parameters.acknowledge.count + 1 };
+        });
+    };
+    let mut bench = jumped();
+    acknowledge(&mut bench, ALARM_COMMISSIONING.into());
+    assert_eq!(bench.first().position, 100_000, "another alarm");
+    acknowledge(&mut bench, ALARM_POSITION.into());
+    let snapshot = bench.stay();
+    assert_eq!((snapshot.channels[0].position, snapshot.channels[0].sensor_state), (700_000, 0));
+    assert_eq!(snapshot.alarms, 0);
+    let start = Start::Retained(jumped().encoder.retained_state());
+    let snapshot = Bench::started(delivered(SensorType::MultiTurn), start, 700_000).stay();
+    assert_eq!((snapshot.channels[0].position, snapshot.alarms), (700_000, 0));
+    // Turns that nobody has counted are no matter of belief.
+    let mut bench = Bench::new(delivered(SensorType::SingleTurnCounted));
+    (0..50).for_each(|_| _ = bench.stay());
+    (0..200).for_each(|_| _ = bench.go(4096));
+    acknowledge(&mut bench, ALARM_POSITION.into());
+    assert_eq!(bench.stay().alarms, ALARM_POSITION);
+}
+
+/// Two missed readings at 10,000 rpm are 0.5 turns of a single-turn sensor.
+#[test]
+fn missed_readings_lose_no_turn_while_the_way_is_certain() {
+    for (missed, is_known) in [(1, true), (2, true), (10, true), (12, false), (4200, false)] {
+        let mut bench = Bench::new(delivered(SensorType::SingleTurnCounted));
+        let mut total = 0;
+        for step in (0..1365_i64).step_by(40).chain([1365; 20]) {
+            total += step;
+            bench.go(total);
+        }
+        for fastest in [u32::MAX, 0] {
+            bench.change(|parameters| parameters.channels[0].fastest = fastest);
+            (0..missed).for_each(|_| _ = bench.receive(None));
+            total += 1365 * (missed + 1);
+            let values = bench.go(total).channels[0];
+            let range = 4096 * 8192;
+            let is_right = i64::from(values.position) == total.rem_euclid(range);
+            assert!(is_right || !is_known, "{missed} at {fastest}: {values:?} and not {total}");
+            assert_eq!(values.sensor_state & SENSOR_POSITION_ERROR != 0, !is_known, "{missed} at {fastest}");
+        }
+    }
+}
+
+/// One EMCY, although the first word comes a millisecond after the start.
+#[test]
+fn a_lost_position_is_one_fault_at_a_start() {
+    let lost = Start::of(Retained::Nothing, Some([0; 2]));
+    let mut bench = Bench::started(delivered(SensorType::SingleTurnCounted), lost, 0);
+    let conditions = [bench.receive(None), bench.stay(), bench.stay()].map(|snapshot| snapshot.conditions);
+    assert!(conditions.iter().all(|all| all.position && !all.sensor_break), "{conditions:?}");
 }

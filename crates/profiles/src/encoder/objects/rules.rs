@@ -58,7 +58,7 @@ impl Fields {
             Rule::Step => allow(self.parameters(image).allow_step(value)),
             Rule::Preset => self.preset(entry, value, image),
             Rule::Sensor => self.describe_sensor(entry, bytes, image),
-            Rule::Factory if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::Access),
+            Rule::Factory if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::DeviceState),
             Rule::Factory => Ok(()),
             Rule::Acknowledge => {
                 count(self.acknowledgements, image);

@@ -215,7 +215,7 @@ fn a_frame_that_cannot_be_is_refused() {
 #[test]
 fn factory_data_is_locked_and_shows_in_the_module_identification() {
     let mut node = Node::new();
-    assert_eq!(node.write(0x2107, 1, 100), Err(Abort::Access));
+    assert_eq!(node.write(0x2107, 1, 100), Err(Abort::DeviceState));
     node.write(0x2108, 0, i64::from(u32::from_le_bytes(*b"fact"))).unwrap();
     for (sub, value) in [(1, 100), (2, 50), (3, 2000)] {
         node.write(0x2107, sub, value).unwrap();
@@ -226,7 +226,7 @@ fn factory_data_is_locked_and_shows_in_the_module_identification() {
     node.turn_to(2000);
     assert_eq!(node.read(0x6400, 1), 1);
     node.write(0x2108, 0, 0).unwrap();
-    assert_eq!(node.write(0x2107, 1, 0), Err(Abort::Access));
+    assert_eq!(node.write(0x2107, 1, 0), Err(Abort::DeviceState));
 }
 
 #[test]

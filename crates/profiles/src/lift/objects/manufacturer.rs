@@ -33,6 +33,11 @@ const fn reading(sub: u8, name: &'static str) -> Object {
     Object::new(0x2304, sub, name, Type::Unsigned32, Access::ReadOnly).unit("6384h:1")
 }
 
+/// Number of presets of a unit: 0 before the first one, 255 when the offset has lost its meaning.
+const fn references(sub: u8, name: &'static str) -> Object {
+    Object::new(0x2306, sub, name, Type::Unsigned8, Access::ReadOnly).stored(Group::Application)
+}
+
 const fn lamp(sub: u8, name: &'static str) -> Object {
     Object::new(0x2322, sub, name, Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo)
 }
@@ -67,18 +72,21 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x2305, 0, "Choice of virtual devices", Type::Unsigned8)
         .limits(0, Devices::ALL.0 as i64)
         .handled(),
-    Object::highest(0x2306, 2, "Sensor references"),
-    Object::new(0x2306, 1, "Sensor 1 references", Type::Unsigned8, Access::ReadOnly),
-    Object::new(0x2306, 2, "Sensor 2 references", Type::Unsigned8, Access::ReadOnly),
+    Object::highest(0x2306, 4, "Position unit references"),
+    references(1, "Position unit 1 references"),
+    references(2, "Position unit 2 references"),
+    references(3, "Position unit 3 references"),
+    references(4, "Position unit 4 references"),
     // One bit for each: 0 for 1901h, 1 to 4 for 1906h, 1907h, 1980h and 1981h. Part of the communication parameters, like
     // the COB-IDs themselves.
     Object::new(SWITCHED_OFF, 0, "TPDOs switched off by a client", Type::Unsigned8, Access::ReadOnly)
         .stored(Group::Communication),
-    Object::highest(0x2310, 2, "Load filter"),
+    Object::highest(0x2310, 3, "Load filter"),
     // Codes as in 61A0h and 61A1h of CiA 404.
-    parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),
+    parameter(0x2310, 1, "Load filter type", Type::Unsigned8).limits(0, 2).value(2),
     parameter(0x2310, 2, "Load filter constant", Type::Unsigned8).limits(1, 255).value(100),
-    // Two equal pressures switch the load measuring unit off.
+    parameter(0x2310, 3, "Load hysteresis", Type::Unsigned16).value(10).unit("kg"),
+    // With two equal pressures no load is measured, as with a broken sensor.
     Object::highest(0x2311, 4, "Load calibration"),
     parameter(0x2311, 1, "Pressure at point 1", Type::Real32).unit("Pa"),
     parameter(0x2311, 2, "Load at point 1", Type::Real32).unit("kg"),

@@ -131,6 +131,9 @@ impl Profile for Objects {
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         match (entry.index(), entry.sub()) {
             (0x6011, 0) => self.follow_output(image),
+            // Old presses are no calls of a panel that has just been chosen.
+            (0x2305, 0) => self.calls.begin(),
+            (0x6120, sub @ 1..) => self.calls.ask(usize::from(sub) - 1),
             (0x2320, sub @ 1..) => self.fields.panel.replace_word(usize::from(sub - 1) / 2, image),
             (0x2322, sub @ 1..) => self.lamps.forget(usize::from(sub) - 1),
             (index @ 0x1901..=0x1981, 1) => self.fields.note_switch(index, image),

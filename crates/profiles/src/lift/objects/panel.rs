@@ -1,7 +1,7 @@
 //! The panel in the image: words of buttons and lamps, virtual input, virtual output.
 
 use super::values::pair;
-use crate::lift::panel::{BUTTONS, Calls, Contact, LAMPS};
+use crate::lift::panel::{BUTTONS, Calls, LAMPS};
 use crate::lift::word::{Light, Word};
 use canopen::dictionary::{Dictionary, Field};
 
@@ -48,14 +48,15 @@ impl PanelFields {
     /// Writes the next call to the virtual input and returns whether there was one. An unused button has no calls.
     #[inline(never)]
     pub(super) fn next_call(&self, calls: &mut Calls, image: &mut [u8]) -> bool {
-        while let Some(Contact { button, is_pressed }) = calls.take_next() {
-            let place = usize::from(button);
+        while let Some(contact) = calls.take_next() {
+            let place = usize::from(contact.button);
             let (Some(words), Some(enabled)) = (self.buttons.get(place), self.enabled.get(place)) else {
                 return false;
             };
             let [released, pressed] = [words[0], words[1]].map(|at| word(at, image));
-            if released != pressed && enabled.u32(image) & 1 != 0 {
-                let Word(told) = if is_pressed { pressed } else { released };
+            let is_used = enabled.u32(image) & 1 != 0;
+            if released != pressed && calls.tell(contact, is_used) {
+                let Word(told) = if contact.is_pressed && is_used { pressed } else { released };
                 self.input.set(image, &told);
                 return true;
             }
@@ -117,6 +118,8 @@ impl PanelFields {
         let output = word(self.output, image);
         let lamps = self.lamp_words.iter().zip(&self.answers).zip(self.lamps.iter().zip(&mut states.lit_by));
         for (([off, on], answer), (lamp, lit_by)) in lamps {
+            // A lamp that a client has put out is lit by no lift.
+            *lit_by = if lamp.u8(image) == 0 { 0 } else { *lit_by };
             if let Some(Light(light)) = says([*off, *on, *answer], output, lit_by, image) {
                 lamp.set(image, &[light]);
             }

@@ -2,7 +2,7 @@
 
 use super::values::{Fields, UnitFields};
 use crate::lift::devices::Devices;
-use crate::lift::position::{INVERTED, NOT_REFERENCED, Source, UNKNOWN};
+use crate::lift::position::{INVERTED, NO_OFFSET, NOT_REFERENCED, Source, UNKNOWN};
 use crate::pressure::objects::calibration;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
@@ -80,6 +80,10 @@ impl Fields {
             let position = unit.position.u32(image);
             let turned = self.position_parameters(image).turned(number, position);
             unit.offset.store(image, turned.unwrap_or(0).to_le_bytes());
+            // The other direction leaves a position as it is; one that is not known needs a preset.
+            if unit.state.u8(image) & (UNKNOWN | NOT_REFERENCED) != 0 && unit.references.u8(image) != 0 {
+                unit.references.store(image, [NO_OFFSET]);
+            }
         }
         Ok(())
     }
@@ -87,8 +91,8 @@ impl Fields {
     /// Computes the offset for a preset. The position already shows the preset, so the next read returns it.
     fn preset(&self, number: usize, preset: u32, image: &mut [u8]) -> Result<(), Abort> {
         let unit = self.unit(number)?;
-        let source = Source::from_code(unit.source.u8(image)).ok_or(Abort::DeviceState)?;
-        if unit.state.u8(image) & (UNKNOWN | NOT_REFERENCED) == UNKNOWN {
+        let has_source = Source::from_code(unit.source.u8(image)).is_some();
+        if !has_source || unit.state.u8(image) & (UNKNOWN | NOT_REFERENCED) == UNKNOWN {
             return Err(Abort::DeviceState);
         }
         let position = unit.reading.u32(image);
@@ -97,9 +101,9 @@ impl Fields {
         unit.position.store(image, preset.to_le_bytes());
         // Another preset before the next sample starts from this one.
         unit.reading.store(image, preset.to_le_bytes());
-        // 0 appears only before the first preset.
-        let references = source.of(&self.references);
-        references.store(image, [references.u8(image).checked_add(1).unwrap_or(1)]);
+        let references = unit.references.u8(image);
+        let next = if references < NO_OFFSET - 1 { references + 1 } else { 1 };
+        unit.references.store(image, [next]);
         Ok(())
     }
 
@@ -114,14 +118,14 @@ impl Fields {
             return Err(Abort::InvalidValue);
         }
         if bytes != before.bytes() {
-            self.units.iter().for_each(|unit| unit.offset.store(image, [0; 4]));
+            self.units.iter().for_each(|unit| unit.drop_offset(image));
         }
         Ok(())
     }
 
     fn take_source(&self, number: usize, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         if bytes != field.get(image) {
-            self.unit(number)?.offset.store(image, [0; 4]);
+            self.unit(number)?.drop_offset(image);
         }
         self.switch_position(number, bytes != [0], image);
         Ok(())

@@ -132,7 +132,7 @@ fn every_parameter_is_saved_and_nothing_else() {
         .filter(|row| (row.access == Access::ReadWrite) != (row.group == Some(Group::Application)))
         .map(|row| row.index)
         .collect();
-    assert_eq!(others, [0x2322, 0x2322, 0x6011], "outputs");
+    assert_eq!(others, [0x2306, 0x2306, 0x2306, 0x2306, 0x2322, 0x2322, 0x6011], "presets, outputs");
 }
 
 /// Except for the trial of a program, the words of the panel and the lift number, which do not concern the measurement,
@@ -277,7 +277,7 @@ fn what_is_not_weighed_is_no_reference() {
     assert_eq!(node.write(0x6486, 0, 0), Err(Abort::DeviceState));
     node.write_real(0x2311, 3, 0.0);
     node.sample();
-    assert_eq!((node.read(0x6480, 1), node.read(0x2313, 2)), (0, 0), "no load measuring unit");
+    assert_eq!((node.read(0x6480, 1), node.read(0x2313, 2)), (0xFFFF, 1), "no characteristic");
     assert_eq!(node.write(0x6486, 0, 0), Err(Abort::DeviceState));
 }
 
@@ -363,7 +363,40 @@ fn a_button_that_is_not_used_says_nothing() {
     node.write(0x6120, 2, 0).unwrap();
     node.inputs.digital = [false, false];
     node.sample();
-    assert_eq!(node.call(), None, "switched off by its parameter");
+    assert_eq!(node.call(), Some(0x12), "the end of a call that was told");
+    for buttons in [[false, true], [false, false]] {
+        node.inputs.digital = buttons;
+        node.sample();
+        assert_eq!(node.call(), None, "switched off by its parameter");
+    }
+}
+
+/// A button that is switched off while it is pressed.
+#[test]
+fn a_call_that_was_told_ends_with_its_button() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 4).unwrap();
+    node.write(0x2320, 1, 0x12).unwrap();
+    node.write(0x2320, 2, 0x13).unwrap();
+    node.inputs.digital = [true, false];
+    node.sample();
+    assert_eq!(node.call(), Some(0x13));
+    node.write(0x6120, 1, 0).unwrap();
+    node.objects.written(&DICTIONARY.find(0x6120, 1).unwrap(), &mut node.image);
+    assert_eq!((node.call(), node.call()), (Some(0x12), None));
+}
+
+/// Lit by lift 2 and put out by a multiplexed PDO: lift 2 no longer counts.
+#[test]
+fn a_lamp_that_a_pdo_has_put_out_is_lit_by_nobody() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 8).unwrap();
+    let word = |lift: i64, light: i64| 0x0405 | lift << 16 | 0xFF << 24 | 0x0F << 32 | light << 40;
+    node.write(0x6200, 1, word(3, 0)).unwrap();
+    assert_eq!(node.output(word(2, 1)), [true, false]);
+    DICTIONARY.find(0x2322, 1).unwrap().field().set(&mut node.image, &[0]);
+    assert_eq!(node.output(word(1, 1)), [true, false]);
+    assert_eq!(node.output(word(1, 0)), [false, false]);
 }
 
 /// A node as delivered, and one with virtual devices other than panels.

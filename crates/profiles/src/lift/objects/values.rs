@@ -6,7 +6,7 @@ use crate::encoder::Area;
 use crate::encoder::objects::Sensors;
 use crate::lift::devices::Devices;
 use crate::lift::load::{self, Point};
-use crate::lift::position::{self, Source, UNITS, UnitParameters, UnitValues};
+use crate::lift::position::{self, NO_OFFSET, Source, UNITS, UnitParameters, UnitValues};
 use crate::lift::{Parameters, Snapshot};
 use crate::pressure::objects::Places;
 use canopen::dictionary::{Dictionary, Field};
@@ -20,8 +20,6 @@ pub struct Fields {
     pub(super) sensors: Sensors,
     pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
-    /// For each channel: how many presets have confirmed the position of its sensor.
-    pub(super) references: [Field; 2],
     travel: Field,
     position_step: Field,
     speed_step: Field,
@@ -30,6 +28,7 @@ pub struct Fields {
     limits: [Field; 4],
     filter_type: Field,
     filter_constant: Field,
+    hysteresis: Field,
     points: [[Field; 2]; 2],
     pub(super) load_offset: Field,
     pub(super) measured_load: Field,
@@ -42,6 +41,8 @@ pub(super) struct UnitFields {
     pub(super) source: Field,
     pub(super) offset: Field,
     pub(super) state: Field,
+    /// Number of presets: see [`UnitParameters::references`].
+    pub(super) references: Field,
     pub(super) operating: Field,
     pub(super) position: Field,
     pub(super) reading: Field,
@@ -59,6 +60,7 @@ impl UnitFields {
             source: d.field(0x2301, sub),
             offset: d.field(0x2302, sub),
             state: d.field(0x2303, sub),
+            references: d.field(0x2306, sub),
             operating: d.field(0x6380, sub),
             position: d.field(0x6383, sub),
             reading: d.field(0x2304, sub),
@@ -78,6 +80,16 @@ impl UnitFields {
             operating: self.operating.u16(image),
             offset: integer(self.offset, image),
             limits: Area { low, high },
+            references: self.references.u8(image),
+        }
+    }
+
+    /// The offset has lost its meaning. A unit that has never been preset has none.
+    #[inline(never)]
+    pub(super) fn drop_offset(&self, image: &mut [u8]) {
+        self.offset.store(image, [0; 4]);
+        if self.references.u8(image) != 0 {
+            self.references.store(image, [NO_OFFSET]);
         }
     }
 
@@ -110,7 +122,6 @@ impl Fields {
                 UnitFields::new(d, 3),
                 UnitFields::new(d, 4),
             ],
-            references: pair(d, 0x2306, 1),
             travel: d.field(0x2300, 0),
             position_step: d.field(0x6384, 1),
             speed_step: d.field(0x6384, 2),
@@ -119,6 +130,7 @@ impl Fields {
             limits: [d.field(0x6483, 1), d.field(0x6483, 2), d.field(0x6483, 3), d.field(0x6483, 4)],
             filter_type: d.field(0x2310, 1),
             filter_constant: d.field(0x2310, 2),
+            hysteresis: d.field(0x2310, 3),
             points: [pair(d, 0x2311, 1), pair(d, 0x2311, 3)],
             load_offset: d.field(0x2312, 0),
             measured_load: d.field(0x2313, 1),
@@ -154,12 +166,8 @@ impl Fields {
     }
 
     pub(super) fn position_parameters(&self, image: &[u8]) -> position::Parameters {
-        let mut sensors = self.sensors.parameters(image);
-        for (channel, references) in sensors.channels.iter_mut().zip(&self.references) {
-            channel.references = references.u8(image);
-        }
         position::Parameters {
-            sensors,
+            sensors: self.sensors.parameters(image),
             travel: NonZeroU32::new(self.travel.u32(image)).unwrap_or(NonZeroU32::MIN),
             position_step: NonZeroU16::new(self.position_step.u16(image)).unwrap_or(NonZeroU16::MIN),
             speed_step: NonZeroU16::new(self.speed_step.u16(image)).unwrap_or(NonZeroU16::MIN),
@@ -177,6 +185,7 @@ impl Fields {
             points: self.points.map(point),
             offset: self.load_offset.f32(image),
             limits: self.limits.map(|at| at.u16(image)),
+            hysteresis: self.hysteresis.u16(image),
         }
     }
 

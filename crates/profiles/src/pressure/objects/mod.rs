@@ -62,6 +62,8 @@ pub(crate) const fn handles_shifted(index: u16, sub: u8, shift: u16) -> bool {
 #[derive(Debug)]
 pub struct Objects {
     fields: &'static Fields,
+    /// Whether each channel shows the value of an intact sensor.
+    is_measured: [bool; 2],
 }
 
 impl Profile for Objects {
@@ -72,7 +74,7 @@ impl Profile for Objects {
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields }
+        Objects { fields, is_measured: [false; 2] }
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {
@@ -80,6 +82,7 @@ impl Profile for Objects {
     }
 
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
+        self.is_measured = [snapshot.pressure.is_measured, snapshot.temperature.is_measured];
         self.fields.publish(snapshot, image);
     }
 
@@ -88,7 +91,7 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        self.fields.write(entry, bytes, image)
+        self.fields.write(entry, bytes, self.is_measured, image)
     }
 
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {

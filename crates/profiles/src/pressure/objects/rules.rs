@@ -2,7 +2,7 @@
 
 use super::Fields;
 use super::calibration;
-use crate::pressure::{STATUS_INVALID, Unit};
+use crate::pressure::Unit;
 use canopen::dictionary::Entry;
 use canopen::sdo::Abort;
 
@@ -44,10 +44,19 @@ const ZERO_SIGNATURE: [u8; 4] = *b"zero";
 
 impl Fields {
     /// Checks a write to an object that has one of the rules above.
-    pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// `is_measured`: whether each channel shows the value of an intact sensor.
+    pub(super) fn write(
+        &self,
+        entry: &Entry,
+        bytes: &[u8],
+        is_measured: [bool; 2],
+        image: &mut [u8],
+    ) -> Result<(), Abort> {
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let is_known = match Rule::shifted(entry.index(), entry.sub(), self.shift) {
-            Some(Rule::Autozero) => return self.autozero(entry.sub(), bytes, image),
+            Some(Rule::Autozero) => {
+                return self.autozero(entry.sub(), bytes, is_measured, image);
+            }
             Some(Rule::Calibration(rule)) => return self.calibration.write(rule, entry, bytes, image),
             Some(Rule::PressureUnit) => Unit::pressure(code).is_some(),
             Some(Rule::TemperatureUnit) => Unit::temperature(code).is_some(),
@@ -56,13 +65,21 @@ impl Fields {
         if is_known { Ok(()) } else { Err(Abort::InvalidValue) }
     }
 
-    /// Changes the offset so that the present process value becomes 0. Refused while the value is not valid.
-    fn autozero(&self, sub: u8, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// Changes the offset so that the present process value becomes 0. Refused while the sensor gives no value; whether
+    /// the integer formats can show the value does not matter.
+    fn autozero(
+        &self,
+        sub: u8,
+        bytes: &[u8],
+        [pressure, temperature]: [bool; 2],
+        image: &mut [u8],
+    ) -> Result<(), Abort> {
         if bytes != ZERO_SIGNATURE {
             return Err(Abort::NotStored);
         }
-        let channel = if sub == 1 { &self.pressure } else { &self.temperature };
-        if channel.status.u8(image) & STATUS_INVALID != 0 {
+        let (channel, is_measured) =
+            if sub == 1 { (&self.pressure, pressure) } else { (&self.temperature, temperature) };
+        if !is_measured {
             return Err(Abort::DeviceState);
         }
         let offset = channel.offset.f32(image) - channel.process_value.f32(image);

@@ -1,0 +1,187 @@
+//! The devices that are judged: an encoder with two channels, and two position units of a lift, each on one sensor.
+
+use profiles::board::{RETAINED_WORDS, RawEncoder, Retained};
+use profiles::encoder::{
+    ALARM_POSITION, CODE_SEQUENCE, Command, DIRECTION, Encoder, Format, Parameters, PositionRecord,
+    RetainedState, SCALING, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED, Scale, Sensor, Start,
+    WARNING_REFERENCE,
+};
+use profiles::lift::position::{self, NOT_REFERENCED, PositionUnits, Source, UNKNOWN, UnitValues};
+use profiles::profile::Chain;
+
+use std::num::NonZeroU32;
+
+use crate::shaft::Case;
+use crate::tally::Reset;
+
+/// A position with what is said about it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shown {
+    pub(crate) position: u32,
+    pub(crate) is_condemned: bool,
+    pub(crate) awaits_index: bool,
+}
+
+pub(crate) trait Device {
+    fn sensor(&self) -> Sensor;
+    /// The scale of the present settings.
+    fn scale(&self) -> Scale;
+    fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2];
+    /// Presets one of the positions, and stores all parameters.
+    fn preset(&mut self, at: usize, value: u32, raw: &RawEncoder);
+    /// Counts the other way.
+    fn turn_round(&mut self);
+    /// Object 2109h; `false` for a device without it.
+    fn acknowledge(&mut self) -> bool;
+    fn restart(&mut self, reset: Reset);
+}
+
+/// The start after a reset.
+fn start(words: [u32; RETAINED_WORDS], reset: Reset) -> Start {
+    let retained = if reset == Reset::NoBattery { Retained::Nothing } else { Retained::Words(words) };
+    Start::of(retained, Some(PositionRecord::of(&words).to_words()))
+}
+
+fn parameters(case: &Case) -> Parameters {
+    let mut parameters = Parameters { index: case.index, format: Format::COMMON, ..Parameters::default() };
+    parameters.channels.iter_mut().for_each(|channel| channel.kind = Some(case.kind));
+    if case.is_scaled {
+        parameters.operating = SCALING;
+        (parameters.per_revolution, parameters.range) = (3600, 36_000);
+        parameters.step = 10_000;
+    }
+    parameters
+}
+
+pub(crate) struct EncoderDevice {
+    encoder: Encoder,
+    parameters: Parameters,
+    /// What the parameter store holds.
+    stored: Parameters,
+}
+
+impl EncoderDevice {
+    pub(crate) fn new(case: &Case) -> EncoderDevice {
+        let parameters = parameters(case);
+        let mut device = EncoderDevice { encoder: Encoder::default(), parameters, stored: parameters };
+        device.encoder.apply(&parameters);
+        device
+    }
+}
+
+impl Device for EncoderDevice {
+    fn sensor(&self) -> Sensor {
+        self.parameters.sensors().next().unwrap()
+    }
+
+    fn scale(&self) -> Scale {
+        self.parameters.scale(&self.sensor())
+    }
+
+    fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2] {
+        let relative = !self.sensor().kind.is_absolute() && !self.sensor().kind.is_retained();
+        let condemning = SENSOR_POSITION_ERROR | if relative { SENSOR_UNREFERENCED } else { 0 };
+        let snapshot = self.encoder.sample(raw);
+        snapshot.channels.map(|values| Shown {
+            position: values.position,
+            is_condemned: values.sensor_state & condemning != 0,
+            awaits_index: self.parameters.index && values.sensor_state & SENSOR_UNREFERENCED != 0,
+        })
+    }
+
+    fn preset(&mut self, at: usize, value: u32, raw: &RawEncoder) {
+        let preset = &mut self.parameters.channels[at].preset;
+        *preset = Command { value, count: preset.count.checked_add(1).unwrap_or(1) };
+        self.encoder.apply(&self.parameters);
+        let offsets = self.encoder.sample(raw).channels.map(|values| values.offset);
+        self.stored = self.parameters;
+        for (channel, offset) in self.stored.channels.iter_mut().zip(offsets) {
+            (channel.offset, channel.preset) = (offset, Command::default());
+        }
+    }
+
+    fn turn_round(&mut self) {
+        self.parameters.operating ^= if self.sensor().kind.is_linear() { DIRECTION } else { CODE_SEQUENCE };
+        self.encoder.apply(&self.parameters);
+    }
+
+    fn acknowledge(&mut self) -> bool {
+        let acknowledge = &mut self.parameters.acknowledge;
+        let count = acknowledge.count.checked_add(1).unwrap_or(1);
+        *acknowledge = Command { value: ALARM_POSITION.into(), count };
+        self.encoder.apply(&self.parameters);
+        true
+    }
+
+    fn restart(&mut self, reset: Reset) {
+        let words = RetainedState::to_words(&self.encoder.retained_state());
+        self.encoder = Encoder::new(start(words, reset));
+        self.parameters = self.stored;
+        self.encoder.apply(&self.parameters);
+    }
+}
+
+/// Two position units with their own zero on one sensor.
+pub(crate) struct LiftDevice {
+    units: PositionUnits,
+    parameters: position::Parameters,
+    stored: position::Parameters,
+    values: [UnitValues; 2],
+}
+
+impl LiftDevice {
+    pub(crate) fn new(case: &Case) -> LiftDevice {
+        // The other pulley has a range that is no whole number of steps.
+        let travel = NonZeroU32::new(if case.is_scaled { 314_159 } else { 200_000 }).unwrap();
+        let sensors = Parameters { operating: 0, ..parameters(case) };
+        let mut parameters = position::Parameters { sensors, travel, ..position::Parameters::default() };
+        parameters.sensors.channels[1].kind = None;
+        parameters.units[..2].iter_mut().for_each(|unit| unit.source = Some(Source::First));
+        let units = PositionUnits::default();
+        let mut device = LiftDevice { units, parameters, stored: parameters, values: Default::default() };
+        device.units.apply(&parameters);
+        device
+    }
+}
+
+impl Device for LiftDevice {
+    fn sensor(&self) -> Sensor {
+        self.parameters.sensors.sensors().next().unwrap()
+    }
+
+    fn scale(&self) -> Scale {
+        let step = NonZeroU32::new(u32::from(self.parameters.position_step.get()) * 10_000).unwrap();
+        Scale::along(&self.sensor().native(), self.parameters.travel, step).unwrap()
+    }
+
+    fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2] {
+        let [first, second, ..] = self.units.sample(raw).units;
+        self.values = [first, second];
+        self.values.map(|values| Shown {
+            position: values.position,
+            is_condemned: values.state & (UNKNOWN | NOT_REFERENCED) != 0,
+            awaits_index: self.parameters.sensors.index && values.warnings & WARNING_REFERENCE != 0,
+        })
+    }
+
+    fn preset(&mut self, at: usize, value: u32, _: &RawEncoder) {
+        let offset = self.parameters.preset(at, self.values[at].reading, value).unwrap();
+        let unit = &mut self.parameters.units[at];
+        (unit.offset, unit.references) = (offset, unit.references % 200 + 1);
+        self.stored = self.parameters;
+        self.units.apply(&self.parameters);
+    }
+
+    fn turn_round(&mut self) {}
+
+    fn acknowledge(&mut self) -> bool {
+        false
+    }
+
+    fn restart(&mut self, reset: Reset) {
+        let words = self.units.retained_state().to_words();
+        self.units = PositionUnits::new(start(words, reset));
+        self.parameters = self.stored;
+        self.units.apply(&self.parameters);
+    }
+}

@@ -1,0 +1,63 @@
+//! A reference model of the shaft judges every position: a position that is wrong must say so, and one that says so
+//! must be believed again as soon as it can be.
+//!
+//! Each case is a sensor type with a range, a personality, and two positions on one sensor. A cycle moves the shaft at
+//! random, disturbs the readings, writes presets and settings, and ends with a reset. `THOROUGH=1` runs 10,000 cycles
+//! and prints the table of docs/evidence.md.
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
+
+mod devices;
+mod shaft;
+mod tally;
+
+use devices::{Device, EncoderDevice, LiftDevice};
+use profiles::encoder::SensorType;
+use shaft::{Case, World};
+use tally::Tally;
+
+/// Cycles for each case.
+fn cycles() -> u32 {
+    if std::env::var("THOROUGH").is_ok_and(|value| value == "1") { 400 } else { 12 }
+}
+
+const KINDS: [SensorType; 9] = [
+    SensorType::SingleTurn,
+    SensorType::MultiTurn,
+    SensorType::SingleTurnCounted,
+    SensorType::Incremental,
+    SensorType::IncrementalCounted,
+    SensorType::LinearIncremental,
+    SensorType::LinearIncrementalCounted,
+    SensorType::LinearAbsolute,
+    SensorType::LinearCyclic,
+];
+
+/// Every sensor type, with the range of its code and with another one, with and without an index.
+fn cases() -> impl Iterator<Item = Case> {
+    KINDS.into_iter().flat_map(|kind| {
+        let indexes: &[bool] = if kind.is_absolute() { &[false] } else { &[false, true] };
+        let case = move |(index, is_scaled)| Case { kind, index, is_scaled };
+        indexes.iter().flat_map(move |index| [(*index, false), (*index, true)].map(case))
+    })
+}
+
+fn judge<D: Device>(seed: u64, new: impl Fn(&Case) -> D) -> Tally {
+    let mut all = Tally::default();
+    for (number, case) in (0..).zip(cases()) {
+        let mut world = World::new(case, new(&case), seed + number);
+        (0..cycles()).for_each(|_| world.cycle());
+        all.add(world.tally);
+    }
+    all.print();
+    all
+}
+
+#[test]
+fn an_encoder_never_shows_a_wrong_position_as_right() {
+    judge(1, EncoderDevice::new).assert_good();
+}
+
+#[test]
+fn position_units_of_a_lift_never_show_a_wrong_position_as_right() {
+    judge(1000, LiftDevice::new).assert_good();
+}
