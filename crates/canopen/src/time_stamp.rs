@@ -64,8 +64,11 @@ impl Service {
     /// The frame with a time: bit 30 of 1012h is set.
     pub(crate) fn frame(&self, time: TimeOfDay) -> Option<Frame> {
         let cob_id = self.cob_id.filter(|cob_id| cob_id.bit30)?;
-        let [a, b, c, d, e, f] = time.encode();
-        Some(Frame::data_frame(cob_id.id, 6, [a, b, c, d, e, f, 0, 0]))
+        let mut data = [0; 8];
+        for (to, from) in data.iter_mut().zip(time.encode()) {
+            *to = from;
+        }
+        Some(Frame::data_frame(cob_id.id, 6, data))
     }
 }
 

@@ -30,9 +30,9 @@ impl<D: Definition> Inner<D> {
     /// Begins or ends the production of SYNCs, after a change of the settings or of the NMT state.
     pub(super) fn restart_sync(&mut self) {
         if self.state.has_services() {
-            self.sync_producer.restart()
+            self.sync_producer.restart();
         } else {
-            self.sync_producer.stop()
+            self.sync_producer.stop();
         }
         self.process_due = STALE;
     }

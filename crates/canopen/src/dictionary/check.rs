@@ -65,8 +65,7 @@ const fn check_row(row: &Object) {
 
 const fn check_default(row: &Object) {
     match (row.default, row.kind) {
-        (DefaultValue::Integer(_), Type::Real64) | (DefaultValue::None, Type::OctetString(_)) => (),
-        (DefaultValue::Integer(value), _) => {
+        (DefaultValue::Integer(value), kind) if !matches!(kind, Type::Real64) => {
             require(row.kind.range().is_some(), row, "the default is an integer, the entry is not");
             let (low, high) = effective_limits(row);
             require(low <= value && value <= high, row, "the default is out of range");
@@ -79,7 +78,9 @@ const fn check_default(row: &Object) {
             require(text.is_ascii(), row, "the default is not ASCII");
             require(text.len() <= capacity as usize, row, "the default is longer than the string");
         }
-        (DefaultValue::NodeId(_), Type::Unsigned32) | (DefaultValue::None, Type::Domain) => (),
+        (DefaultValue::NodeId(_), Type::Unsigned32)
+        | (DefaultValue::Integer(_), Type::Real64)
+        | (DefaultValue::None, Type::Domain | Type::OctetString(_)) => (),
         _ => fail(row.index, row.sub, "the default is of another type than the entry"),
     }
 }

@@ -35,7 +35,7 @@ impl Application for Switch {
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         if entry.index() == 0x2011 {
             let off = if bytes == [0] { 1 << 31 } else { 0 };
-            COB_ID.store(image, (u32::from(ID) + 0x180 | off).to_le_bytes());
+            COB_ID.store(image, ((u32::from(ID) + 0x180) | off).to_le_bytes());
         }
         Ok(())
     }
