@@ -1,8 +1,7 @@
 //! The transmitter: sensor, pressure channel, temperature channel.
 
 use super::{
-    Channel, ChannelParameters, ChannelValues, PressureCalibration, STATUS_UNCOMPENSATED, Span,
-    TemperatureCalibration, Unit,
+    Channel, ChannelParameters, ChannelValues, PressureCalibration, Span, TemperatureCalibration, Unit,
 };
 use crate::board::{ChipThermometer, Inputs, PowerOn, RawSample};
 use crate::profile::Chain;
