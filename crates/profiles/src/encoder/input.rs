@@ -416,12 +416,11 @@ impl Input {
 
     fn count(&mut self, raw: &RawEncoder, scale: &Scale) -> Observation {
         let word = raw.counter.into();
-        let moved = match &mut self.tracker {
-            Some(tracker) => tracker.follow(word),
-            None => {
-                self.begin(word, scale);
-                0
-            }
+        let moved = if let Some(tracker) = &mut self.tracker {
+            tracker.follow(word)
+        } else {
+            self.begin(word, scale);
+            0
         };
         if self.gap > 0 && self.is_uncertain() {
             self.reference.unseen();

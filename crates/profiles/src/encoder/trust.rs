@@ -153,7 +153,7 @@ impl Rest {
         self.millis = 0;
     }
 
-    pub(super) fn is_moving(&self) -> bool {
+    pub(super) fn is_moving(self) -> bool {
         self.millis < REST_MILLIS
     }
 }
