@@ -115,6 +115,7 @@ fn a_count_is_lost_when_the_shaft_turns_at_a_reset_though_the_battery_is_good() 
     for (kind, rpm) in [(3, 1000), (3, -3000), (5, 60), (5, 6000)] {
         let (mut world, master) = start(&format!("--shaft rpm:{rpm}"));
         write(&mut world, &master, SENSOR_TYPE, 1, kind);
+        wait(&mut world, 10);
         write(&mut world, &master, PRESET, 4, PRESET_VALUE);
         assert_eq!(master.ask(&mut world, 1, &SAVE)[0], 0x60);
         wait(&mut world, 300);

@@ -42,7 +42,7 @@ impl Default for Module {
 #[must_use]
 pub fn area_state(area: &Area, module: &Module, position: u32, range: i64, native: i64) -> u8 {
     let position = i64::from(position);
-    let position = if area.low < 0 { seen_from(area, position, range) } else { position };
+    let position = if area.low < 0 { seen_from(*area, position, range) } else { position };
     let is_low = module.low > i32::MIN && native <= module.low.into();
     let is_high = module.high < i32::MAX && native >= module.high.into();
     let bit = |set: bool, mask: u8| if set { mask } else { 0 };
@@ -53,7 +53,7 @@ pub fn area_state(area: &Area, module: &Module, position: u32, range: i64, nativ
 
 /// The position below zero of which this one is the same, where that is nearer to a work area that begins below zero.
 #[inline(never)]
-fn seen_from(area: &Area, position: i64, range: i64) -> i64 {
+fn seen_from(area: Area, position: i64, range: i64) -> i64 {
     let (low, high) = (i64::from(area.low), i64::from(area.high));
     let below = position - range;
     if position > high && (below >= low || low - below < position - high) { below } else { position }

@@ -35,22 +35,32 @@ struct Window {
 }
 
 impl Window {
-    /// The interval of the cam, with `margin` added on both sides.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Both are below the range, at most 2^32.
+    /// The interval of the cam, with `margin` added on both sides; `true` with the interval of all other positions, for a
+    /// cam across the end of the range.
     #[inline(never)]
-    fn new(cam: &Cam, margin: u16, range: i64) -> Window {
+    fn new(cam: &Cam, margin: u16, range: i64) -> (Window, bool) {
         let low = i64::from(cam.low.min(cam.high)) - i64::from(margin);
         let high = i64::from(cam.low.max(cam.high)) + i64::from(margin);
-        let low_in_range = low.checked_rem_euclid(range).unwrap_or(0);
-        Window { low: low_in_range as u32, length: (high - low).min(range - 1) as u32 }
+        let length = high - low;
+        let low = low.checked_rem_euclid(range).unwrap_or(0);
+        let end = low + length;
+        if length >= range - 1 {
+            (Window { low: 0, length: u32::MAX }, false)
+        } else if end < range {
+            (Window::of(low, length), false)
+        } else {
+            (Window::of(end - range + 1, range - length - 2), true)
+        }
     }
 
-    /// `range` modulo 2^32.
-    #[inline]
-    fn contains(self, position: u32, range: u32) -> bool {
-        let above = position.wrapping_sub(self.low);
-        let above = if position < self.low { above.wrapping_add(range) } else { above };
-        above <= self.length
+    /// Both are below the range, at most 2^32.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn of(low: i64, length: i64) -> Window {
+        Window { low: low as u32, length: length as u32 }
+    }
+
+    fn contains(self, position: u32) -> bool {
+        position.wrapping_sub(self.low) <= self.length
     }
 }
 
@@ -59,8 +69,8 @@ impl Window {
 pub struct CamChannel {
     enable: u8,
     polarity: u8,
-    /// The range of the positions, modulo 2^32.
-    range: u32,
+    /// Bits of the cams with a window of all other positions, in the order of `windows`.
+    inverted: [u8; 2],
     /// Bits of the cams that begin within the range.
     reachable: u8,
     /// For each cam: the window in which the cam goes on, and the window in which the cam stays on.
@@ -70,12 +80,16 @@ pub struct CamChannel {
 
 impl CamChannel {
     /// Takes over parameters. Positions repeat after `range`, at most 2^32.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn apply(&mut self, cams: &Cams, range: i64) {
         (self.enable, self.polarity, self.reachable) = (cams.enable, cams.polarity, 0);
-        self.range = range as u32;
+        self.inverted = [0; 2];
         for ((cam, windows), bit) in cams.cams.iter().zip(&mut self.windows).zip(BITS) {
-            *windows = [0, cam.hysteresis].map(|margin| Window::new(cam, margin, range));
+            let margins = [0, cam.hysteresis];
+            for ((window, inverted), margin) in windows.iter_mut().zip(&mut self.inverted).zip(margins) {
+                let (new, is_inverted) = Window::new(cam, margin, range);
+                *window = new;
+                *inverted |= if is_inverted { bit } else { 0 };
+            }
             self.reachable |= if i64::from(cam.low.min(cam.high)) < range { bit } else { 0 };
         }
     }
@@ -87,9 +101,11 @@ impl CamChannel {
         let mut active = 0;
         for ([on, stay], bit) in self.windows.iter().zip(BITS) {
             let window = if self.active & bit == 0 { on } else { stay };
-            active |= if window.contains(position, self.range) { bit } else { 0 };
+            active |= if window.contains(position) { bit } else { 0 };
         }
-        self.active = active & self.enable & self.reachable;
+        let [on, stay] = self.inverted;
+        let inverted = (on & !self.active) | (stay & self.active);
+        self.active = (active ^ inverted) & self.enable & self.reachable;
         (self.active ^ self.polarity) & self.enable
     }
 }

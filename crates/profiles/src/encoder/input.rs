@@ -416,11 +416,16 @@ impl Input {
 
     fn count(&mut self, raw: &RawEncoder, scale: &Scale) -> Observation {
         let word = raw.counter.into();
-        let moved = self.tracker.as_ref().map_or(0, |tracker| tracker.distance(word));
+        let moved = if let Some(tracker) = &mut self.tracker {
+            tracker.follow(word)
+        } else {
+            self.begin(word, scale);
+            0
+        };
         if self.gap > 0 && self.is_uncertain() {
             self.reference.unseen();
         }
-        self.take(word, moved, scale);
+        self.step = moved;
         self.note_rest();
         let fastest = self.sensor.fastest;
         let is_fast = moved.unsigned_abs() > fastest && fastest > 0 && self.gap == 0;

@@ -127,18 +127,24 @@ impl Reference {
     }
 
     /// Steps may have been lost.
+    #[cold]
+    #[inline(never)]
     pub(super) fn doubt(&mut self) {
         self.trust.doubt();
         self.settle();
     }
 
     /// Turns may have been lost.
+    #[cold]
+    #[inline(never)]
     pub(super) fn lose(&mut self) {
         self.trust.lose();
         self.settle();
     }
 
     /// The sensor may have moved unseen, by any distance.
+    #[cold]
+    #[inline(never)]
     pub(super) fn unseen(&mut self) {
         self.trust = self.trust.unseen();
         self.settle();

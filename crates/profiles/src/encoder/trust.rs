@@ -103,9 +103,9 @@ impl Trust {
         self.users |= ALL << 4;
     }
 
-    /// After a movement that nobody has seen.
+    /// After a movement that nobody has seen. The place of the index in the count is lost too.
     pub(super) fn unseen(self) -> Trust {
-        Trust { users: u8::MAX, ..self }
+        Trust { users: u8::MAX, flags: self.flags & !Trust::REFERENCED }
     }
 }
 
@@ -153,7 +153,7 @@ impl Rest {
         self.millis = 0;
     }
 
-    pub(super) fn is_moving(&self) -> bool {
+    pub(super) fn is_moving(self) -> bool {
         self.millis < REST_MILLIS
     }
 }

@@ -84,11 +84,14 @@ impl PressureCalibration {
         self.start + (self.end - self.start) * ((ratio - self.zero.at(t)) / self.span.at(t))
     }
 
-    /// Whether the pressure depends on the temperature.
+    /// Bits of the status (6150h) of a pressure without a measured temperature.
     #[must_use]
-    pub fn has_drift(&self) -> bool {
+    #[cold]
+    #[inline(never)]
+    pub fn uncompensated(&self) -> u8 {
         let Polynomial { linear, quadratic, .. } = self.zero;
-        [linear, quadratic, self.span.linear, self.span.quadratic].iter().any(|drift| *drift != 0.0)
+        let drifts = [linear, quadratic, self.span.linear, self.span.quadratic];
+        if drifts.iter().any(|drift| *drift != 0.0) { super::STATUS_UNCOMPENSATED } else { 0 }
     }
 
     /// Whether the ratio is outside the range of an intact sensor.

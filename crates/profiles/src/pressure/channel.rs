@@ -137,8 +137,14 @@ impl Channel {
             | p.span16.status(process_value16)
             | p.span32.status(process_value32);
         let status = spans | if valid && fits16(shifted) { 0 } else { STATUS_INVALID };
-        let is_measured = valid && process_value.abs() < f32::MAX;
-        ChannelValues { field_value, process_value, process_value16, process_value32, status, is_measured }
+        ChannelValues {
+            field_value,
+            process_value,
+            process_value16,
+            process_value32,
+            status,
+            is_measured: valid,
+        }
     }
 }
 

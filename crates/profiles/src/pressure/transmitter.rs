@@ -1,8 +1,7 @@
 //! The transmitter: sensor, pressure channel, temperature channel.
 
 use super::{
-    Channel, ChannelParameters, ChannelValues, PressureCalibration, STATUS_UNCOMPENSATED, Span,
-    TemperatureCalibration, Unit,
+    Channel, ChannelParameters, ChannelValues, PressureCalibration, Span, TemperatureCalibration, Unit,
 };
 use crate::board::{ChipThermometer, Inputs, PowerOn, RawSample};
 use crate::profile::Chain;
@@ -115,8 +114,8 @@ impl Transmitter {
         let pressure = self.calibration.pressure.pressure(ratio, kelvin);
         let is_valid = !conditions.sensor_break && !conditions.pressure_rail;
         snapshot.pressure = self.pressure.sample(pressure, is_valid);
-        if kelvin.is_none() && self.calibration.pressure.has_drift() {
-            snapshot.pressure.status |= STATUS_UNCOMPENSATED;
+        if kelvin.is_none() {
+            snapshot.pressure.status |= self.calibration.pressure.uncompensated();
         }
         // A temperature that cannot be measured reads 0 K, as in a transmitter without a temperature sensor.
         snapshot.temperature = self.temperature.sample(kelvin.unwrap_or(0.0), !conditions.temperature_rail);

@@ -79,10 +79,12 @@ impl Fields {
         }
         let (channel, is_measured) =
             if sub == 1 { (&self.pressure, pressure) } else { (&self.temperature, temperature) };
-        if !is_measured {
+        let value = channel.process_value.f32(image);
+        // The largest value stands for one that no REAL32 can show.
+        if !is_measured || value.abs() >= f32::MAX {
             return Err(Abort::DeviceState);
         }
-        let offset = channel.offset.f32(image) - channel.process_value.f32(image);
+        let offset = channel.offset.f32(image) - value;
         channel.offset.store(image, offset.to_le_bytes());
         Ok(())
     }
