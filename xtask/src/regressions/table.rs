@@ -27,8 +27,8 @@ pub(super) struct Edit {
 /// A deadline in the past reaches the caller.
 const PAST_DEADLINES: Edit = Edit {
     file: "crates/canopen/src/device/process.rs",
-    mended: "self.basic.process_due = due.max(context.now.plus(Duration(1)));",
-    fault: "self.basic.process_due = due;",
+    mended: "self.process_due = due.max(context.now.plus(Duration(1)));",
+    fault: "self.process_due = due;",
 };
 
 /// PDOs take the whole bus.
@@ -42,13 +42,13 @@ const NO_SHARE: &[Edit] = &[Edit {
 const CHECK_AFTER_EFFECT: &[Edit] = &[
     Edit {
         file: "crates/canopen/src/device/objects.rs",
-        mended: "let job = self.check_store(entry)?;",
-        fault: "let job = self.check_store(entry);",
+        mended: "let job = self.job_of(entry)?;",
+        fault: "let job = self.job_of(entry);",
     },
     Edit {
         file: "crates/canopen/src/device/objects.rs",
-        mended: "job.map_or(Ok(()), |job| self.store_at_once(job))",
-        fault: "job?.map_or(Ok(()), |job| self.store_at_once(job))",
+        mended: "job.map_or(Ok(()), |job| self.begin_deferred(job))",
+        fault: "job?.map_or(Ok(()), |job| self.begin_deferred(job))",
     },
 ];
 
@@ -95,7 +95,7 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "heartbeat-late",
         scenario: "starving::event_timers_of_a_millisecond_on_all_tpdos_of_a_lift_leave_room",
         edits: &[Edit {
-            file: "crates/canopen/src/transmit.rs",
+            file: "crates/canopen/src/pdo/context.rs",
             mended: "self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)",
             fault: "self.room() > ROOM_FOR_OTHERS",
         }],
@@ -166,9 +166,9 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "states::an_error_that_stops_a_node_is_reported_first",
         edits: &[
             Edit {
-                file: "crates/canopen/src/device/full.rs",
-                mended: "        if Self::has(Services::EMCY) && self.basic.state.has_services() {\n            self.emcy.poll(context);\n        }\n        self.react();",
-                fault: "        self.react();\n        if Self::has(Services::EMCY) && self.basic.state.has_services() {\n            self.emcy.poll(context);\n        }",
+                file: "crates/canopen/src/device/inner.rs",
+                mended: "        if Self::has(Services::EMCY) && self.state.has_services() {\n            self.emcy.poll(D::Application::LISTS_DETAIL, context);\n        }\n",
+                fault: "        self.react();\n        if Self::has(Services::EMCY) && self.state.has_services() {\n            self.emcy.poll(D::Application::LISTS_DETAIL, context);\n        }\n",
             },
             Edit {
                 file: "crates/canopen/src/device/faults.rs",
@@ -194,13 +194,13 @@ pub(super) const MENDS: &[Mend] = &[
         edits: &[
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
-                mended: "            self.errors |= self.repeat(fault, now);\n        }\n        is_new",
-                fault: "            self.history.push(fault.condition(self.conditions).code);\n            self.errors |= self.repeat(fault, now);\n        }\n        is_new",
+                mended: "            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
+                fault: "            self.history.push(fault.condition(self.conditions).code, [0; 2]);\n            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
             },
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
-                mended: "            if message.code != 0 {\n                self.history.push(message.code);\n            }\n",
-                fault: "",
+                mended: "self.history.push(message.code, if lists_detail { [first, second] } else { [0; 2] });",
+                fault: "let _ = (first, second, lists_detail);",
             },
         ],
     },
