@@ -35,6 +35,14 @@ impl Pair {
     pub const fn exactly(id: u16) -> Pair {
         Pair { id: id & 0x7FF, mask: 0x7FF }
     }
+
+    /// The register of a bank with 16-bit masks: the identifier below the mask. IDE is compared, so that extended
+    /// frames do not pass; RTR is not (RM0390, 30.7.4).
+    #[must_use]
+    pub fn register(self) -> u32 {
+        const IDE: u32 = 1 << 3;
+        (u32::from(self.mask) << 5 | IDE) << 16 | u32::from(self.id) << 5
+    }
 }
 
 /// One filter bank.

@@ -64,7 +64,7 @@ impl Board {
         let gpioa = device.GPIOA.split(&mut rcc);
         let gpiob = device.GPIOB.split(&mut rcc);
         let gpioc = device.GPIOC.split(&mut rcc);
-        let (can, transmitter) = Controller::new(device.CAN1, gpiob.pb9, gpiob.pb8, losses, &mut rcc);
+        let (can, transmitter) = Controller::new(device.CAN1, losses, &mut rcc);
         let analogue = sampling::Parts {
             adc: device.ADC1,
             common: device.ADC_COMMON,

@@ -1,18 +1,16 @@
 //! CAN1: bring-up, filters and state. The mailboxes are in `transmit` and `receive`.
 //!
-//! The crate bxcan waits without a bound for each change of the mode. The changes between initialisation and sleep need
-//! no bus (RM0390, 30.4). To leave the bus, the controller waits for the end of a frame, and with RX held dominant it may
-//! wait for ever: that change has a bound here.
+//! The crate bxcan brings the controller to initialisation after a reset, and switches modes and interrupts. Timing and
+//! filters are set here, because the crate's code for them does not fit the bootloader. The crate waits without a bound
+//! for each change of the mode: to leave the bus, the controller waits for the end of a frame, and with RX held dominant
+//! for ever (RM0390, 30.4). That change has a bound here.
 
-use bxcan::filter::Mask16;
-use bxcan::{Interrupts, StandardId};
+use bxcan::Interrupts;
 use canopen::Duration;
-use stm32f4xx_hal::can::Can as Pins;
-use stm32f4xx_hal::gpio::{PB8, PB9, Speed};
 use stm32f4xx_hal::pac::{CAN1, RCC, can1};
-use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::gpio::output_of;
+use super::gpio::{enable, output_of, port};
 use super::time_base::Clock;
 use super::transmit::Transmitter;
 use crate::bit_rate_detection::Heard;
@@ -32,14 +30,6 @@ unsafe impl bxcan::Instance for Registers {
     const REGISTERS: *mut bxcan::RegisterBlock = CAN1::ptr().cast_mut().cast();
 }
 
-// SAFETY: CAN1 owns all banks of the pair CAN1 and CAN2 (RM0390, 30.7.4).
-unsafe impl bxcan::FilterOwner for Registers {
-    const NUM_FILTER_BANKS: u8 = BANKS as u8;
-}
-
-// SAFETY: as above; CAN2 is the slave and stays off.
-unsafe impl bxcan::MasterInstance for Registers {}
-
 pub(crate) fn registers() -> &'static can1::RegisterBlock {
     // SAFETY: see the implementation of `Instance`; each caller uses its own registers only.
     unsafe { &*CAN1::ptr() }
@@ -55,29 +45,18 @@ pub(super) fn hold_in_reset() {
 pub struct Controller {
     can: bxcan::Can<Registers>,
     losses: &'static Losses,
-    _pins: Pins<CAN1>,
 }
 
 impl Controller {
     /// Takes the peripheral and its pins, without going on the bus until [`Controller::start`]. A mode that the
     /// controller does not change is counted in `losses`.
-    ///
-    /// TX has medium speed: at low speed its edges take up to 100 ns, a tenth of a bit at 1 Mbit/s (STM32F446 datasheet,
-    /// I/O AC characteristics). RX is pulled up, so that without a transceiver the bus is recessive. The transceiver is
-    /// awake from here on.
-    pub(crate) fn new(
-        can: CAN1,
-        tx: PB9,
-        rx: PB8,
-        losses: &'static Losses,
-        rcc: &mut Rcc,
-    ) -> (Controller, Transmitter) {
-        <output_of!(BOARD.standby)>::new(rcc);
-        let tx = tx.into_alternate::<9>().speed(Speed::Medium);
-        let rx = rx.into_alternate::<9>().internal_pull_up(true);
-        let pins = Pins::new(can, (tx, rx), rcc);
+    /// The transceiver is awake from here on.
+    pub(crate) fn new(_can: CAN1, losses: &'static Losses, rcc: &mut Rcc) -> (Controller, Transmitter) {
+        make_pins(rcc);
+        CAN1::enable(rcc);
+        CAN1::reset(rcc);
         let can = bxcan::Can::builder(Registers).leave_disabled();
-        (Controller { can, losses, _pins: pins }, Transmitter::new())
+        (Controller { can, losses }, Transmitter::new())
     }
 
     /// Goes on the bus, or restarts on the bus: drops the content of the mailboxes and takes new timing and filters.
@@ -95,7 +74,11 @@ impl Controller {
     fn join(&mut self, timing: BitTiming, banks: &[Bank], silent: bool) {
         registers().tsr().write(|w| w.abrq0().set_bit().abrq1().set_bit().abrq2().set_bit());
         self.stop();
-        self.can.modify_config().set_bit_timing(timing.btr()).set_silent(silent).leave_disabled();
+        registers().btr().write(|w| {
+            // SAFETY: `BitTiming` asserts that its values fit the register.
+            unsafe { w.bits(timing.btr()) };
+            w.silm().bit(silent)
+        });
         self.set_filters(banks);
         self.enable_interrupts();
         self.mark_error_code();
@@ -154,13 +137,32 @@ impl Controller {
         registers().esr().modify(|_, w| unsafe { w.lec().bits(UNTOUCHED) });
     }
 
-    /// Replaces the filters. Frames that end during the change, a few microseconds, are not received.
+    /// Replaces the filters. Frames that end during the change, a few microseconds, are not received. CAN1 owns all
+    /// banks of the pair CAN1 and CAN2, and each bank has two pairs of identifier and mask (RM0390, 30.7.4).
     pub fn set_filters(&mut self, banks: &[Bank]) {
-        let mut filters = self.can.modify_filters();
-        filters.set_split(BANKS as u8).clear();
-        for (index, bank) in (0..BANKS as u8).zip(banks) {
-            filters.enable_bank(index, fifo(bank.fifo), masks(bank));
+        let can = registers();
+        // SAFETY: the value is the number of banks.
+        can.fmr().modify(|_, w| unsafe { w.finit().set_bit().can2sb().bits(BANKS as u8) });
+        let [mut active, mut services, mut bit] = [0, 0, 1];
+        for (place, bank) in can.fb_iter().zip(banks) {
+            let [first, second] = bank.pairs.map(Pair::register);
+            // SAFETY: any identifiers and masks.
+            unsafe {
+                place.fr1().write(|w| w.bits(first));
+                place.fr2().write(|w| w.bits(second));
+            }
+            active |= bit;
+            services |= if bank.fifo == Fifo::Services { bit } else { 0 };
+            bit <<= 1;
         }
+        // SAFETY: a bit for each bank in all of these registers.
+        unsafe {
+            can.fm1r().write(|w| w.bits(0));
+            can.fs1r().write(|w| w.bits(0));
+            can.ffa1r().write(|w| w.bits(services));
+            can.fa1r().write(|w| w.bits(active));
+        }
+        can.fmr().modify(|_, w| w.finit().clear_bit());
     }
 
     /// State of the fault confinement; acknowledges the error interrupt.
@@ -181,6 +183,20 @@ impl Controller {
             .ier()
             .modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit().lecie().clear_bit());
     }
+}
+
+/// Switches PB8 and PB9 to CAN1: alternate function 9 (STM32F446 datasheet, table 11).
+///
+/// TX has medium speed: at low speed its edges take up to 100 ns, a tenth of a bit at 1 Mbit/s (STM32F446 datasheet, I/O AC
+/// characteristics). RX is pulled up, so that without a transceiver the bus is recessive.
+fn make_pins(rcc: &RCC) {
+    <output_of!(BOARD.standby)>::new(rcc);
+    enable('B', rcc);
+    let port = port('B');
+    port.afrh().modify(|_, w| w.afrh8().af9().afrh9().af9());
+    port.ospeedr().modify(|_, w| w.ospeedr9().medium_speed());
+    port.pupdr().modify(|_, w| w.pupdr8().pull_up());
+    port.moder().modify(|_, w| w.moder8().alternate().moder9().alternate());
 }
 
 /// Requests initialisation, and waits until the controller acknowledges it and has left sleep.
@@ -213,18 +229,3 @@ const LONGEST_FRAME: Duration = Duration::from_millis(25);
 const NO_ERROR: u8 = 0;
 const NO_ACKNOWLEDGE: u8 = 3;
 const UNTOUCHED: u8 = 7;
-
-fn fifo(fifo: Fifo) -> bxcan::Fifo {
-    match fifo {
-        Fifo::Process => bxcan::Fifo::Fifo0,
-        Fifo::Services => bxcan::Fifo::Fifo1,
-    }
-}
-
-fn masks(bank: &Bank) -> [Mask16; 2] {
-    bank.pairs.map(|Pair { id, mask }| Mask16::frames_with_std_id(standard(id), standard(mask)))
-}
-
-fn standard(id: u16) -> StandardId {
-    StandardId::new(id).unwrap_or(StandardId::MAX)
-}

@@ -20,7 +20,7 @@ const fn place_of(letter: char) -> usize {
 }
 
 /// Switches the clock of a port on.
-fn enable(letter: char, rcc: &RCC) {
+pub(super) fn enable(letter: char, rcc: &RCC) {
     // SAFETY: a bit for each port, in the order of the ports.
     rcc.ahb1enr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << place_of(letter)) });
     let _ = rcc.ahb1enr().read();

@@ -1,6 +1,6 @@
 //! Bring-up of the board for the bootloader, in two steps: the parts for the decision at every start, and the bus.
 
-use stm32f4xx_hal::pac::{CAN1, GPIOB, Peripherals, RCC, TIM2};
+use stm32f4xx_hal::pac::{CAN1, Peripherals, RCC, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use update::Reset;
@@ -31,7 +31,6 @@ pub struct Rest {
     rcc: Rcc,
     can: CAN1,
     timer: TIM2,
-    port: GPIOB,
 }
 
 /// The parts for the bus.
@@ -61,7 +60,7 @@ impl Loader {
         clock_tree::raise(&device.RCC, &device.FLASH);
         let rcc = device.RCC.constrain();
         let flash = ProgramFlash::new(Flash::new(device.FLASH));
-        let rest = Rest { rcc, can: device.CAN1, timer: device.TIM2, port: device.GPIOB };
+        let rest = Rest { rcc, can: device.CAN1, timer: device.TIM2 };
         Loader { reset, watchdog, flash, rest }
     }
 }
@@ -72,9 +71,8 @@ impl Rest {
     pub fn start(mut self, losses: &'static Losses) -> Bus {
         self.rcc.csr().modify(|_, w| w.rmvf().set_bit());
         let (time, [alarm, _]) = time_base::start(self.timer, &mut self.rcc);
-        let gpiob = self.port.split(&mut self.rcc);
         let led = Led::new(&self.rcc);
-        let (can, transmitter) = Controller::new(self.can, gpiob.pb9, gpiob.pb8, losses, &mut self.rcc);
+        let (can, transmitter) = Controller::new(self.can, losses, &mut self.rcc);
         Bus { time, alarm, can, transmitter, led }
     }
 
