@@ -1,7 +1,7 @@
 //! CAN1: bring-up, filters and state. The mailboxes are in `transmit` and `receive`.
 //!
-//! The crate bxcan brings the controller to initialisation after a reset, and switches modes and interrupts. Timing and
-//! filters are set here, because the crate's code for them does not fit the bootloader. The crate waits without a bound
+//! The crate bxcan brings the controller to initialisation after a reset, and switches its interrupts. Timing,
+//! filters and modes are set here, because the crate's code for them does not fit the bootloader. The crate waits without a bound
 //! for each change of the mode: to leave the bus, the controller waits for the end of a frame, and with RX held dominant
 //! for ever (RM0390, 30.4). That change has a bound here.
 
@@ -82,10 +82,9 @@ impl Controller {
         self.set_filters(banks);
         self.enable_interrupts();
         self.mark_error_code();
-        // Clears the sleep request; the controller joins after 11 recessive bits.
-        let _ = self.can.enable_non_blocking();
-        // bxcan has enabled the automatic return from bus-off; `crate::back_off` decides on the return instead.
-        registers().mcr().modify(|_, w| w.abom().clear_bit());
+        // The controller joins after 11 recessive bits. The automatic return from bus-off is off: `crate::back_off`
+        // decides on the return.
+        registers().mcr().modify(|_, w| w.abom().clear_bit().sleep().clear_bit().inrq().clear_bit());
     }
 
     /// Leaves the bus for initialisation, at the end of the frame on the bus. A controller that does not leave the bus
