@@ -12,7 +12,7 @@ use node::{
 };
 use profiles::board::{ChipThermometer, POSITION_RECORD_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, View};
-use update::{Authorisation, Programs, Trial};
+use update::{Authorisation, Trial};
 
 use crate::bit_rate::Rate;
 
@@ -69,7 +69,6 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
     if let Some(memory) = &mut memory {
         let records = &mut memory.store().flash().trial();
         protocol.set_trial(Trial::read(records, &LAYOUT));
-        protocol.set_programs(Programs::read(records, &LAYOUT));
     }
     protocol.show_memory(memory.as_ref().map_or(MemoryState::BROKEN, ParameterMemory::state));
     Loaded { protocol, parameters, setup, rate, boot_data: fault, memory, position_record }

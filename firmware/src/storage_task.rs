@@ -8,7 +8,7 @@ use canopen::sdo::Abort;
 use canopen::{Duration, Instant};
 use node::{MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict};
 use profiles::board::RETAINED_WORDS;
-use update::Trial;
+use update::{Programs, Trial};
 
 use crate::SERVICES;
 use crate::shared::Shared;
@@ -27,6 +27,8 @@ pub(crate) struct StorageTask {
     /// The retained positions, and the time of their last change.
     positions: Option<[u32; POSITIONS]>,
     moved: Instant,
+    /// The programs in the flash are reported to the node (2004h).
+    has_reported_programs: bool,
 }
 
 /// The words retained by the last sample; `None` if the profile retains nothing.
@@ -41,7 +43,14 @@ impl StorageTask {
         job: &'static mut StoreJob,
         position_record: StoredPositionRecord,
     ) -> StorageTask {
-        StorageTask { memory, job, position_record, positions: None, moved: Instant(0) }
+        StorageTask {
+            memory,
+            job,
+            position_record,
+            positions: None,
+            moved: Instant(0),
+            has_reported_programs: false,
+        }
     }
 
     /// Whether the store works.
@@ -72,6 +81,15 @@ impl StorageTask {
         }
     }
 
+    /// Reports the programs in the flash, once. To look at them takes milliseconds, which the start does not wait for.
+    #[inline(never)]
+    pub(crate) fn report_programs(&mut self, node: &mut impl Shared) {
+        let Some(memory) = self.memory.as_mut().filter(|_| !self.has_reported_programs) else { return };
+        self.has_reported_programs = true;
+        let programs = Programs::read(&mut memory.store().flash().trial(), &LAYOUT);
+        node.call(|protocol, _| protocol.set_programs(programs));
+    }
+
     /// Carries out the verdict on the trial of this program.
     pub(crate) fn judge(&mut self, node: &mut impl Shared) {
         let Some(verdict) = node.call(|protocol, _| protocol.verdict()) else { return };
@@ -86,6 +104,7 @@ impl StorageTask {
             _ if !is_done => defmt::error!("the trial of this program cannot be ended"),
             Verdict::Confirm => {
                 defmt::info!("this program is confirmed");
+                self.has_reported_programs = false;
                 node.call(|protocol, _| protocol.end_trial());
             }
             Verdict::TakeBack => {

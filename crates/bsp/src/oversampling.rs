@@ -11,6 +11,9 @@ pub const WORDS: usize = SCANS * CHANNELS / 2;
 
 /// Largest result of a conversion.
 const FULL_SCALE: usize = 4095;
+/// The sum of a millisecond at the upper rail.
+#[allow(clippy::cast_possible_truncation, reason = "a product of two small constants")]
+const RAIL: u32 = (FULL_SCALE * SCANS) as u32;
 const _: () = {
     assert!(FULL_SCALE * SCANS / 2 < 1 << 16, "the sum of a lower half must not reach into the upper one");
     assert!(
@@ -46,7 +49,7 @@ pub fn pressure(words: &[AtomicU32; WORDS], sum: u32) -> u32 {
     let [.., last, _, _] = words;
     match last.load(Ordering::Relaxed) >> 16 {
         0 => 0,
-        4095.. => (FULL_SCALE * SCANS) as u32,
+        4095.. => RAIL,
         _ => sum,
     }
 }

@@ -86,9 +86,10 @@ impl Protocol {
         self.device.application_mut().trial.state = trial;
     }
 
-    /// Takes the programs in the flash. To be called before the start.
+    /// Takes the programs in the flash.
     pub fn set_programs(&mut self, programs: Programs) {
         self.device.application_mut().programs = programs;
+        self.device.show(|application, image| application.show_programs(image));
     }
 
     /// Whether the program is still on trial. Until then stored data must stay as the previous program has stored it,

@@ -23,7 +23,7 @@ fn the_start_up_of_the_firmware_gives_144_mhz() {
     let clocks = rig.chip.clocks();
     assert_eq!(
         (clocks.hclk_cycle(), clocks.pclk1_cycle(), clocks.pclk2_cycle()),
-        (Time(70), Time(280), Time(140))
+        (Time(7000), Time(28_000), Time(14_000))
     );
 }
 

@@ -30,7 +30,7 @@ const BUFFER: u32 = 0x2000_4000;
 const DMA_IRQ: u8 = 56;
 const ADC_IRQ: u8 = 18;
 /// One cycle of the ADC clock: PCLK2 of 72 MHz over 4.
-const CYCLE: u64 = 560;
+const CYCLE: u64 = 56_000;
 /// The sampling period: 16 kHz.
 const PERIOD: u64 = Time::PER_SECOND / 16_000;
 /// End of the sample time of channels 0, 1, 18 and 17: 28, 28, 480 and 480 cycles of sampling, 12 of conversion each.

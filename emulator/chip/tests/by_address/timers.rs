@@ -18,7 +18,7 @@ const TIM2_IRQ: u8 = 28;
 const TIM3_IRQ: u8 = 29;
 
 /// One cycle of the timers on APB1: 72 MHz.
-const CYCLE: Time = Time(140);
+const CYCLE: Time = Time::of_cycle(72_000_000);
 
 fn rig() -> Rig {
     let mut rig = Rig::new();

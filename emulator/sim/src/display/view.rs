@@ -24,8 +24,8 @@ const WITH_BORDERS: u16 = 18;
 const KEYS: &str = "? help  q quit";
 /// The help text of `?`. No line is longer than the width of the narrowest terminal that shows everything.
 const HELP: [&str; 7] = [
-    "pressure, temperature, thermistor, supply,",
-    "shaft, button, fault: [ID=]SPEC, as",
+    "pressure, temperature, thermistor,",
+    "supply, shaft, button, fault [ID=]SPEC",
     "  pressure 1=sine:250000,100000,0.1",
     "  fault open-sensor@2",
     "quit, q, Ctrl-C: ends with a summary",

@@ -128,7 +128,6 @@ fn contents() -> Vec<Kind> {
 
 #[test]
 fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
-    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = Bench::running();
     let before = bench.application();
     bench.stop();

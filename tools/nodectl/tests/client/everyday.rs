@@ -163,7 +163,9 @@ fn words_are_written_for_units_and_signatures() {
         printed(&wire, &["write", "2203", "cali"]);
         printed(&wire, &["write", "2200:1", "5"]);
         let zero = format!("{:04X}:1", 0x6125 + shift);
-        printed(&wire, &["write", &zero, "zero"]);
+        // Before its first measurement, the node has no value to set to zero.
+        let (code, text) = failed(&wire, &["write", &zero, "zero"]);
+        assert!(code == 1 && text.contains("the process value is not valid"), "{text}");
         // As a node answers whose process value is not valid.
         wire.disturb(|frame| match (frame.id(), frame.data()) {
             (0x581, &[0x60, low, high, sub, ..]) => {
