@@ -129,7 +129,7 @@ impl<D: Device> World<D> {
 
     /// A movement, a few events, and a reset.
     pub(crate) fn cycle(&mut self) {
-        for _ in 0..1 + self.random.below(3) {
+        for _ in 0..=self.random.below(3) {
             self.target = self.speed_of_choice();
             self.run_between(50, 450);
             self.event();
@@ -265,7 +265,7 @@ impl<D: Device> World<D> {
         let scale = self.device.scale();
         let range = u128::from(scale.range().get()) * u128::from(scale.turn().get());
         let units = (1_u128 << self.device.sensor().bits()) * u128::from(scale.units());
-        self.case.kind.is_absolute() && units % range == 0
+        self.case.kind.is_absolute() && units.is_multiple_of(range)
     }
 
     fn restart(&mut self) {
