@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::{env, fs};
 
-/// Writes the `image.x` that memory.x includes, and passes both to the linker. The regions are those of the image in flash and in RAM;
-/// `script` is the script of cortex-m-rt, or one in the directory of the image.
+/// Writes the `image.x` that memory.x includes, and passes both to the linker. The regions are those of the image in
+/// flash and in RAM; `script` is the script of cortex-m-rt, or one in the directory of the image.
 pub(crate) fn image([flash, ram]: [&str; 2], script: &str) {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = here.join("..");

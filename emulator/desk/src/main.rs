@@ -31,14 +31,7 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    match run(&Cli::parse()) {
-        Ok(report::Result::Red) => ExitCode::FAILURE,
-        Ok(_) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::from(2)
-        }
-    }
+    report::exit_code(run(&Cli::parse()))
 }
 
 fn run(cli: &Cli) -> Result<report::Result> {

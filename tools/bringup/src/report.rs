@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
+use std::process::ExitCode;
 
 use anyhow::{Context, Result as Anyhow};
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,18 @@ pub enum Result {
     Red,
     /// Not tried, or of no consequence.
     Skipped,
+}
+
+/// The exit status of a run: 1 for a step that is red, 2 for an error, which is printed.
+pub fn exit_code(outcome: Anyhow<Result>) -> ExitCode {
+    match outcome {
+        Ok(Result::Red) => ExitCode::FAILURE,
+        Ok(_) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
 }
 
 /// A check: what was seen, what was expected, and what to do when they differ.
