@@ -1,5 +1,7 @@
 //! The registers that the steps read (RM0390, RM0090), and what a running node has in them.
 
+use bsp::boards::{ALL, Chip as Family};
+
 /// CPUID of a Cortex-M4 r0p1 (ARM DDI 0439, 4.1).
 pub const CPUID: (u32, u32) = (0xE000_ED00, 0x410F_C241);
 /// DBGMCU_IDCODE; its lower 12 bits name the device.
@@ -49,12 +51,29 @@ impl Chip {
     #[must_use]
     pub fn named(name: &str) -> Option<Chip> {
         let name = name.to_ascii_uppercase();
-        if name.starts_with("STM32F446") {
-            return Some(Chip { device: 0x421, flash: 512, bypass: true });
-        }
-        let is_other = name.starts_with("STM32F405") || name.starts_with("STM32F407");
+        let families = [
+            ("STM32F446", Family::F446, 0x421),
+            ("STM32F405", Family::F405, 0x413),
+            ("STM32F407", Family::F407, 0x413),
+        ];
+        let (_, family, device) = families.into_iter().find(|(prefix, ..)| name.starts_with(prefix))?;
+        let (_, board) = ALL.into_iter().find(|(_, board)| board.chip == family)?;
         // The letter of the flash size: E 512 KiB, G 1 MiB.
         let flash = if name.chars().nth(10) == Some('E') { 512 } else { 1024 };
-        is_other.then_some(Chip { device: 0x413, flash, bypass: false })
+        Some(Chip { device, flash, bypass: board.oscillator.is_bypassed })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chip_has_the_clock_source_of_its_board_and_the_flash_of_its_name() {
+        let chip = |device, flash, bypass| Some(Chip { device, flash, bypass });
+        assert_eq!(Chip::named("STM32F446RETx"), chip(0x421, 512, true));
+        assert_eq!(Chip::named("stm32f405RGTx"), chip(0x413, 1024, false));
+        assert_eq!(Chip::named("STM32F407VETx"), chip(0x413, 512, false));
+        assert_eq!(Chip::named("STM32F103C8"), None);
     }
 }
