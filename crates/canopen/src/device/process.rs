@@ -129,7 +129,7 @@ impl<D: Definition> Device<D> {
     }
 
     /// The identifiers as acceptance filters: each with a mask of the bits to compare. If an RPDO takes the frames of
-    /// all nodes ([`Application::takes_all_nodes`]), there are far fewer filters than identifiers.
+    /// all nodes ([`takes_all_nodes`](crate::Application::takes_all_nodes)), there are far fewer filters than identifiers.
     pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
         let all_nodes = self.inner.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
         self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
