@@ -63,6 +63,8 @@ mod header;
 mod image;
 pub mod key;
 #[cfg(feature = "mock")]
+mod known;
+#[cfg(feature = "mock")]
 pub mod mock;
 mod programs;
 mod record;
