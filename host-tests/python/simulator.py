@@ -185,3 +185,9 @@ class Listener:
             time, data = self.next()
             if wanted(data):
                 return time, data
+
+
+def nodectl(simulator: Simulator, *arguments, node: int = 1) -> subprocess.CompletedProcess:
+    bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+    command = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", str(node), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=10 * PATIENCE)

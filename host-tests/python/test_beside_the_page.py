@@ -2,25 +2,15 @@
 
 import json
 import os
-import subprocess
 import time
 from pathlib import Path
 
-import pytest
 from full_bus import Client
-from simulator import PATIENCE, Master, Simulator
+from simulator import PATIENCE, Master, Simulator, nodectl
 
 #: All personalities, with node-IDs at both ends.
 NODES = {1: "pressure", 16: "lift", 64: "encoder", 127: "combined"}
 BOARDS = [flag for node, personality in NODES.items() for flag in ("--node", f"{node}:{personality}")]
-#: The personality that is checked in a usual run; --thorough checks all.
-CHECKED = list(NODES.values()) if "THOROUGH" in os.environ else ["pressure"]
-
-
-def nodectl(simulator: Simulator, *arguments, node: int = 1) -> subprocess.CompletedProcess:
-    bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
-    command = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", str(node), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=10 * PATIENCE)
 
 
 def requests(log: Path) -> list[str]:
@@ -84,13 +74,4 @@ def test_the_update_command_works_every_time():
         done = nodectl(simulator, "update", str(image), "--force", "--json")
         assert done.returncode == 0, f"update {number + 1}: {done.stdout} {done.stderr}"
         assert json.loads(done.stdout)["result"] == "updated"
-    simulator.quit()
-
-
-@pytest.mark.parametrize("personality", CHECKED)
-def test_every_check_passes(personality: str):
-    simulator = Simulator("--node", f"5:{personality}", "--bitrate", "1000", speed="real")
-    Master(simulator).close()
-    done = nodectl(simulator, "check", "--yes", node=5)
-    assert done.returncode == 0, done.stdout
     simulator.quit()

@@ -15,6 +15,9 @@ use crate::command::{target_dir, with_log};
 /// The number of slowest tests that the report names.
 const SLOWEST: usize = 12;
 
+/// Tests that mostly wait run beside the others: this many for each core.
+const WAITING: usize = 3;
+
 /// The period of printing the number of finished tests.
 const PERIOD: Duration = Duration::from_secs(20);
 
@@ -107,8 +110,8 @@ impl<'a> Report<'a> {
         self.only
     }
 
-    /// Runs the lanes, each in its order, and the tests in any order beside them: one test per core, and as many again
-    /// of the tests that mostly wait.
+    /// Runs the lanes, each in its order, and the tests in any order beside them: one test per core, and [`WAITING`]
+    /// tests per core that mostly wait.
     pub(super) fn run(&self, lanes: [Vec<Step>; 2], tests: Vec<Step>) -> Result<()> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
         let pool = Pool::new(tests);
@@ -116,8 +119,8 @@ impl<'a> Report<'a> {
             for lane in lanes {
                 scope.spawn(|| self.lane(lane));
             }
-            for _ in 0..workers {
-                for queue in [&pool.busy, &pool.waiting] {
+            for (queue, number) in [(&pool.busy, workers), (&pool.waiting, WAITING * workers)] {
+                for _ in 0..number {
                     scope.spawn(|| pool.work(queue, |test| self.step(test, true)));
                 }
             }
