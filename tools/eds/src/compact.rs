@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use crate::ini::{Ini, Section};
 use crate::read::value;
-use crate::{Access, DataType, Entry, Error, Flags, Formula, Value};
+use crate::{Access, DataType, Entry, Flags, Formula, Value};
 
 /// The entries of an object that has `count` of them, each like `pattern`. Sections `[1003Name]` and `[1003Value]` hold
 /// the names and defaults of the entries that differ.
-pub(crate) fn entries(ini: &Ini, pattern: &Entry, count: u8) -> Result<BTreeMap<u8, Entry>, Error> {
+pub(crate) fn entries(ini: &Ini, pattern: &Entry, count: u8) -> BTreeMap<u8, Entry> {
     let mut entries = BTreeMap::from([(0, number_of_entries(pattern.index, count))]);
     entries.extend((1..=count).map(|sub| (sub, like(pattern, sub))));
     for (sub, name) in lines(section(ini, pattern.index, "name")) {
@@ -19,10 +19,10 @@ pub(crate) fn entries(ini: &Ini, pattern: &Entry, count: u8) -> Result<BTreeMap<
     let values = section(ini, pattern.index, "value");
     for (sub, text) in lines(values) {
         if let (Some(entry), Some(section)) = (entries.get_mut(&sub), values) {
-            entry.default = Some(value(section, "", text, entry.data_type)?);
+            entry.default = value(section, "", text, entry.data_type);
         }
     }
-    Ok(entries)
+    entries
 }
 
 fn section<'a>(ini: &'a Ini, index: u16, name: &str) -> Option<Section<'a>> {

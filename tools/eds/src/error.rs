@@ -1,8 +1,8 @@
-//! Errors of a data sheet.
+//! Errors and warnings of a data sheet.
 
 use thiserror::Error;
 
-/// An error of a data sheet and its place.
+/// An error or a warning of a data sheet, and its place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{}{problem}", self.place())]
 pub struct Error {
@@ -16,7 +16,7 @@ pub struct Error {
     pub problem: Problem,
 }
 
-/// A kind of error in a data sheet.
+/// A kind of mistake in a data sheet.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Problem {
     /// The text is not made of sections and keys.

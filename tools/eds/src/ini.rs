@@ -1,14 +1,17 @@
 //! Sections and keys of a text, with their lines.
 
+use std::cell::RefCell;
+
 use configparser::ini::{Ini as Parser, IniDefault};
 
-use crate::value::number;
+use crate::value::{number, repaired};
 use crate::{Error, Problem};
 
 /// A parsed text. Names of sections and keys are compared without case.
 pub(crate) struct Ini<'a> {
     text: &'a str,
     parser: Parser,
+    warnings: RefCell<Vec<Error>>,
 }
 
 impl<'a> Ini<'a> {
@@ -16,11 +19,19 @@ impl<'a> Ini<'a> {
         let text = text.trim_start_matches('\u{FEFF}');
         let mut parser = Parser::new_from_defaults(syntax());
         match parser.read(text.into()) {
-            Ok(_) => Ok(Ini { text, parser }),
+            Ok(_) => Ok(Ini { text, parser, warnings: RefCell::default() }),
             Err(message) => {
                 Err(Error { section: String::new(), key: "", line: None, problem: Problem::Syntax(message) })
             }
         }
+    }
+
+    /// The warnings so far, each once, in the order of the file.
+    pub(crate) fn into_warnings(self) -> Vec<Error> {
+        let mut warnings = self.warnings.into_inner();
+        warnings.sort_by_key(|warning| warning.line);
+        warnings.dedup();
+        warnings
     }
 
     /// All sections, in the order of the file.
@@ -84,29 +95,36 @@ impl<'a> Section<'a> {
         without_comment(keys.get(&key.to_ascii_lowercase())?.as_deref()?)
     }
 
-    /// The value of a key, or an error where the key is missing.
-    pub(crate) fn required(self, key: &'static str) -> Result<&'a str, Error> {
-        self.get(key).ok_or_else(|| self.error(key, Problem::Missing))
+    /// The value of a key. A missing key is a warning.
+    pub(crate) fn required(self, key: &'static str) -> Option<&'a str> {
+        let value = self.get(key);
+        if value.is_none() {
+            self.warn(key, Problem::Missing);
+        }
+        value
     }
 
-    /// The number of a key, 0 where there is none.
-    pub(crate) fn number<T: TryFrom<i128> + Default>(self, key: &'static str) -> Result<T, Error> {
-        let Some(text) = self.get(key) else { return Ok(T::default()) };
-        let value = number(text).and_then(|value| T::try_from(value).ok());
-        value.ok_or_else(|| {
-            self.wrong(key, text, format!("a number of at most {} bits", 8 * std::mem::size_of::<T>()))
+    /// The number of a key; 0 where there is none. A wrong number is a warning.
+    pub(crate) fn number<T: TryFrom<i128> + Default>(self, key: &'static str) -> T {
+        let Some(text) = self.get(key) else { return T::default() };
+        let read = |text: &str| number(text).and_then(|value| T::try_from(value).ok());
+        read(text).unwrap_or_else(|| {
+            let bits = 8 * std::mem::size_of::<T>();
+            self.wrong(key, text, format!("a number of at most {bits} bits"));
+            repaired(text, read).unwrap_or_default()
         })
     }
 
-    /// The error of a key with a wrong value.
-    pub(crate) fn wrong(self, key: &'static str, text: &str, expected: impl Into<String>) -> Error {
-        self.error(key, Problem::Value { text: text.into(), expected: expected.into() })
+    /// A warning: the key has a wrong value.
+    pub(crate) fn wrong(self, key: &'static str, text: &str, expected: impl Into<String>) {
+        self.warn(key, Problem::Value { text: text.into(), expected: expected.into() });
     }
 
-    /// An error of a key; with an empty key, an error of the section.
-    pub(crate) fn error(self, key: &'static str, problem: Problem) -> Error {
+    /// A warning about a key; with an empty key, about the section.
+    pub(crate) fn warn(self, key: &'static str, problem: Problem) {
         let line = self.ini.line(self.name, &key.to_ascii_lowercase());
-        Error { section: self.name.into(), key, line, problem }
+        let warning = Error { section: self.name.into(), key, line, problem };
+        self.ini.warnings.borrow_mut().push(warning);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::{Access, Commissioning, DataType, Formula, ObjectType};
+use crate::{Access, Commissioning, DataType, Error, Formula, ObjectType};
 
 /// A data sheet: the device and all its objects.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,6 +13,8 @@ pub struct Eds {
     pub objects: BTreeMap<u16, Object>,
     /// The device that the values are for; `None` for a data sheet, which has no values.
     pub commissioning: Option<Commissioning>,
+    /// The mistakes of the file that was read, in the order of its lines.
+    pub warnings: Vec<Error>,
 }
 
 impl Eds {

@@ -1,8 +1,9 @@
 //! Reader of data sheets: from text to [`Eds`], by CiA 306 and with the deviations of vendors.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::ini::{Ini, Section};
+use crate::value::repaired;
 use crate::{
     Access, Commissioning, DataType, DeviceInfo, Eds, Entry, Error, Flags, Formula, Object, ObjectType,
     Problem, compact,
@@ -26,29 +27,31 @@ const FIRST_OBJECT: u16 = 0x1000;
 impl Eds {
     /// Reads a data sheet (EDS) or a configuration file (DCF) of any vendor.
     ///
-    /// A missing required key of an object or a wrong value is an error. Unknown sections and keys are ignored.
+    /// Mistakes in sections and keys are [warnings](Eds::warnings): a missing name is replaced by the address, a missing
+    /// or unknown type by DOMAIN, a missing or unknown access by `ro`; a wrong value is left out, or read as far as it is
+    /// a value (`0.0f`, `12UL`, `5 // off`). Unknown sections and keys are ignored.
     ///
     /// # Errors
-    /// The first thing in the file that is wrong, with its section, its key and its line.
+    /// The text is not made of sections and keys.
     pub fn parse(text: &str) -> Result<Eds, Error> {
         let ini = Ini::parse(text)?;
-        let device = ini.section("deviceinfo").map(device_info).transpose()?.unwrap_or_default();
+        let device = ini.section("deviceinfo").map(device_info).unwrap_or_default();
         let mut objects = BTreeMap::new();
         for section in ini.sections() {
             if let Some((index, None)) = address(section.name()) {
-                objects.insert(index, object(&ini, section, index)?);
+                objects.insert(index, object(&ini, section, index));
             }
         }
         for section in ini.sections() {
             if let Some((index, Some(sub))) = address(section.name()) {
-                let object = objects.get_mut(&index).ok_or_else(|| section.error("", Problem::Orphan))?;
-                object.entries.insert(sub, entry(section, index, sub)?);
+                let object = objects.entry(index).or_insert_with(|| orphanage(section, index));
+                object.entries.insert(sub, entry(section, index, sub));
             }
         }
         // CiA 306 spells this name with one m; some vendors write two.
         let commissioning = ini.section("devicecomissioning").or_else(|| ini.section("devicecommissioning"));
-        let commissioning = commissioning.map(self::commissioning).transpose()?;
-        let mut eds = Eds { device, objects, commissioning };
+        let commissioning = commissioning.map(self::commissioning);
+        let mut eds = Eds { device, objects, commissioning, warnings: ini.into_warnings() };
         eds.drop_unused_flags();
         Ok(eds)
     }
@@ -79,113 +82,121 @@ fn address(section: &str) -> Option<(u16, Option<u8>)> {
     }
 }
 
-fn device_info(section: Section) -> Result<DeviceInfo, Error> {
+fn device_info(section: Section) -> DeviceInfo {
     let text = |key| section.get(key).unwrap_or_default().to_owned();
-    let mut bit_rates = BTreeSet::new();
-    for (rate, key) in BIT_RATES {
-        if flag(section, key)? {
-            bit_rates.insert(rate);
-        }
-    }
-    Ok(DeviceInfo {
+    let rates = BIT_RATES.into_iter().filter(|(_, key)| flag(section, key)).map(|(rate, _)| rate);
+    DeviceInfo {
         vendor_name: text("VendorName"),
-        vendor_number: section.number("VendorNumber")?,
+        vendor_number: section.number("VendorNumber"),
         product_name: text("ProductName"),
-        product_number: section.number("ProductNumber")?,
-        revision_number: section.number("RevisionNumber")?,
+        product_number: section.number("ProductNumber"),
+        revision_number: section.number("RevisionNumber"),
         order_code: text("OrderCode"),
-        bit_rates,
-        granularity: section.number("Granularity")?,
-        group_messaging: flag(section, "GroupMessaging")?,
-        rpdos: section.number("NrOfRXPDO")?,
-        tpdos: section.number("NrOfTXPDO")?,
-        lss: flag(section, "LSS_Supported")?,
-    })
+        bit_rates: rates.collect(),
+        granularity: section.number("Granularity"),
+        group_messaging: flag(section, "GroupMessaging"),
+        rpdos: section.number("NrOfRXPDO"),
+        tpdos: section.number("NrOfTXPDO"),
+        lss: flag(section, "LSS_Supported"),
+    }
 }
 
-fn commissioning(section: Section) -> Result<Commissioning, Error> {
-    Ok(Commissioning {
-        node_id: section.number("NodeID")?,
-        bit_rate: section.number("Baudrate")?,
-        serial: section.number("LSS_SerialNumber")?,
-    })
+fn commissioning(section: Section) -> Commissioning {
+    Commissioning {
+        node_id: section.number("NodeID"),
+        bit_rate: section.number("Baudrate"),
+        serial: section.number("LSS_SerialNumber"),
+    }
 }
 
-fn flag(section: Section, key: &'static str) -> Result<bool, Error> {
-    section.number::<u8>(key).map(|value| value != 0)
+fn flag(section: Section, key: &'static str) -> bool {
+    section.number::<u8>(key) != 0
 }
 
-fn object(ini: &Ini, section: Section, index: u16) -> Result<Object, Error> {
-    let name = section.required("ParameterName")?.to_owned();
-    let object_type = object_type(section)?;
-    let entries = match section.number("CompactSubObj")? {
+fn object(ini: &Ini, section: Section, index: u16) -> Object {
+    let name = name(section, index, None);
+    let object_type = object_type(section);
+    let entries = match section.number("CompactSubObj") {
         0 if object_type.has_subs() => BTreeMap::new(),
-        0 => BTreeMap::from([(0, entry(section, index, 0)?)]),
-        count => compact::entries(ini, &entry(section, index, 0)?, count)?,
+        0 => BTreeMap::from([(0, entry(section, index, 0))]),
+        count => compact::entries(ini, &entry(section, index, 0), count),
     };
-    Ok(Object { index, name, object_type, entries })
+    Object { index, name, object_type, entries }
+}
+
+/// The record of a sub-index whose index has no section.
+fn orphanage(section: Section, index: u16) -> Object {
+    section.warn("", Problem::Orphan);
+    let name = format!("{index:04X}h");
+    Object { index, name, object_type: ObjectType::Record, entries: BTreeMap::new() }
+}
+
+fn name(section: Section, index: u16, sub: Option<u8>) -> String {
+    let address = || sub.map_or_else(|| format!("{index:04X}h"), |sub| format!("{index:04X}h:{sub}"));
+    section.required("ParameterName").map_or_else(address, str::to_owned)
 }
 
 /// An object without an object type is a variable (CiA 306); if the object counts sub-indices, a record.
-fn object_type(section: Section) -> Result<ObjectType, Error> {
-    let Some(text) = section.get("ObjectType") else {
-        let has_subs = section.number::<u8>("SubNumber")? != 0;
-        return Ok(if has_subs { ObjectType::Record } else { ObjectType::Var });
+fn object_type(section: Section) -> ObjectType {
+    let by_content = || {
+        let has_subs = section.number::<u8>("SubNumber") != 0;
+        if has_subs { ObjectType::Record } else { ObjectType::Var }
     };
-    let code = section.number("ObjectType")?;
-    ObjectType::from_code(code).ok_or_else(|| {
-        section.wrong(
-            "ObjectType",
-            text,
-            "a variable (0x7), an array (0x8), a record (0x9) or a domain (0x2)",
-        )
+    let Some(text) = section.get("ObjectType") else { return by_content() };
+    ObjectType::from_code(section.number("ObjectType")).unwrap_or_else(|| {
+        let expected = "a variable (0x7), an array (0x8), a record (0x9) or a domain (0x2)";
+        section.wrong("ObjectType", text, expected);
+        by_content()
     })
 }
 
-fn entry(section: Section, index: u16, sub: u8) -> Result<Entry, Error> {
-    let data_type = data_type(section)?;
-    Ok(Entry {
+fn entry(section: Section, index: u16, sub: u8) -> Entry {
+    let data_type = data_type(section);
+    let is_of_object = !section.name().contains("sub");
+    Entry {
         index,
         sub,
-        name: section.required("ParameterName")?.to_owned(),
+        name: name(section, index, (!is_of_object).then_some(sub)),
         data_type,
-        access: access(section)?,
-        default: formula(section, "DefaultValue", data_type)?,
-        value: formula(section, "ParameterValue", data_type)?,
-        low: formula(section, "LowLimit", data_type)?,
-        high: formula(section, "HighLimit", data_type)?,
-        mappable: flag(section, "PDOMapping")?,
-        // A mistake in the flags is no reason to refuse the file.
-        flags: Some(Flags(section.number("ObjFlags").unwrap_or_default())),
+        access: access(section),
+        default: formula(section, "DefaultValue", data_type),
+        value: formula(section, "ParameterValue", data_type),
+        low: formula(section, "LowLimit", data_type),
+        high: formula(section, "HighLimit", data_type),
+        mappable: flag(section, "PDOMapping"),
+        flags: Some(Flags(section.number("ObjFlags"))),
         unit: String::new(),
-    })
+    }
 }
 
 /// The data type of a section. A domain may leave it out.
-fn data_type(section: Section) -> Result<DataType, Error> {
-    if section.get("DataType").is_none() && object_type(section)? == ObjectType::Domain {
-        return Ok(DataType::DOMAIN);
+fn data_type(section: Section) -> DataType {
+    if section.get("DataType").is_none() && object_type(section) == ObjectType::Domain {
+        return DataType::DOMAIN;
     }
-    section.required("DataType")?;
-    section.number("DataType").map(DataType)
+    match section.required("DataType").map(|_| section.number("DataType")) {
+        None | Some(0) => DataType::DOMAIN,
+        Some(code) => DataType(code),
+    }
 }
 
-fn access(section: Section) -> Result<Access, Error> {
-    let text = section.required("AccessType")?;
-    let expected = "one of ro, wo, rw, rwr, rww and const";
-    Access::from_text(text).ok_or_else(|| section.wrong("AccessType", text, expected))
+fn access(section: Section) -> Access {
+    let Some(text) = section.required("AccessType") else { return Access::ReadOnly };
+    Access::from_text(text).unwrap_or_else(|| {
+        section.wrong("AccessType", text, "one of ro, wo, rw, rwr, rww and const");
+        if text.eq_ignore_ascii_case("w") { Access::WriteOnly } else { Access::ReadOnly }
+    })
 }
 
-fn formula(section: Section, key: &'static str, data_type: DataType) -> Result<Option<Formula>, Error> {
-    section.get(key).map(|text| value(section, key, text, data_type)).transpose()
+fn formula(section: Section, key: &'static str, data_type: DataType) -> Option<Formula> {
+    value(section, key, section.get(key)?, data_type)
 }
 
 /// The value of a key, or of a numbered line, by its data type.
-pub(crate) fn value(
-    section: Section,
-    key: &'static str,
-    text: &str,
-    data_type: DataType,
-) -> Result<Formula, Error> {
-    Formula::parse(text, data_type).ok_or_else(|| section.wrong(key, text, format!("a value of {data_type}")))
+pub(crate) fn value(section: Section, key: &'static str, text: &str, data_type: DataType) -> Option<Formula> {
+    let read = |text: &str| Formula::parse(text, data_type);
+    read(text).or_else(|| {
+        section.wrong(key, text, format!("a value of {data_type}"));
+        repaired(text, read)
+    })
 }

@@ -19,7 +19,7 @@ impl Device {
     #[must_use]
     pub fn eds(&self) -> Eds {
         let objects = self.objects().map(|rows| self.object(rows)).map(|object| (object.index, object));
-        let mut eds = Eds { device: self.info(), objects: objects.collect(), commissioning: None };
+        let mut eds = Eds { device: self.info(), objects: objects.collect(), ..Eds::default() };
         eds.drop_unused_flags();
         eds
     }

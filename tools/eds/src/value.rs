@@ -116,6 +116,17 @@ pub(crate) fn number(text: &str) -> Option<i128> {
     Some(sign * value)
 }
 
+/// The value in a text that is more than a value: the first word (`5 // off`), without the suffix of a number in C
+/// (`0.0f`, `12UL`); a BOOLEAN that is not 0 is 1.
+pub(crate) fn repaired<T>(text: &str, read: impl Fn(&str) -> Option<T>) -> Option<T> {
+    let word = text.split_whitespace().next()?;
+    let integer = word.trim_end_matches(['l', 'L', 'u', 'U']);
+    let real = word.trim_end_matches(['f', 'F']);
+    let is_boolean = read("1").is_some() && read("2").is_none();
+    let truth = || number(integer).filter(|&value| is_boolean && value > 1).and_then(|_| read("1"));
+    [word, integer, real].into_iter().find_map(&read).or_else(truth)
+}
+
 /// A number of a signed type. Vendors also write negative numbers as the unsigned number with the same bits.
 fn signed(value: i128, bits: u8) -> Option<i128> {
     let half = 1_i128 << (bits - 1);

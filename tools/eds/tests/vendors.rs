@@ -114,8 +114,11 @@ fn an_empty_file_has_no_objects() {
     assert_eq!(Eds::parse("").unwrap(), Eds::default());
 }
 
+/// The first warning about an object of these lines, which is read nevertheless.
 fn object(lines: &str) -> Error {
-    Eds::parse(&format!("[DeviceInfo]\nVendorNumber=1\n[2001]\n{lines}")).unwrap_err()
+    let eds = Eds::parse(&format!("[DeviceInfo]\nVendorNumber=1\n[2001]\n{lines}")).unwrap();
+    assert!(eds.objects.contains_key(&0x2001));
+    eds.warnings[0].clone()
 }
 
 #[test]
@@ -151,9 +154,52 @@ fn a_compact_value_is_checked_in_its_own_section() {
 }
 
 #[test]
-fn a_sub_index_needs_its_object() {
-    let error = Eds::parse("[2002sub1]\nParameterName=X\nDataType=5\nAccessType=rw").unwrap_err();
-    assert_eq!(error.to_string(), "line 1: [2002sub1]: the object has no section of its own");
+fn a_sub_index_without_its_object_is_read_with_a_warning() {
+    let eds = Eds::parse("[2002sub1]\nParameterName=X\nDataType=5\nAccessType=rw").unwrap();
+    assert_eq!(eds.warnings[0].to_string(), "line 1: [2002sub1]: the object has no section of its own");
+    assert_eq!((&eds.objects[&0x2002].name[..], &get(&eds, 0x2002, 1).name[..]), ("2002h", "X"));
+}
+
+/// Each mistake of a vendor, the value that is read nevertheless, and that one warning names its line.
+#[test]
+fn a_mistake_of_a_vendor_is_a_warning_and_the_rest_is_read() {
+    let cases = [
+        ("DataType=8", "DefaultValue=0.0f", Some(Formula::Constant(Value::Real(0.0)))),
+        ("DataType=8", "DefaultValue=1.5 // bar", Some(Formula::Constant(Value::Real(1.5)))),
+        ("DataType=7", "DefaultValue=12UL", integer(12)),
+        ("DataType=0x15", "DefaultValue=0x7FLL", integer(127)),
+        ("DataType=5", "DefaultValue=3 # three", integer(3)),
+        ("DataType=1", "DefaultValue=3", integer(1)),
+        ("DataType=7", "DefaultValue=$MY_NODE_ID", None),
+        ("DataType=5", "DefaultValue=none", None),
+        ("DataType=5", "DefaultValue=256", None),
+    ];
+    for (data_type, line, value) in cases {
+        let text = format!(
+            "[2001]\nParameterName=X\n{data_type}\nAccessType=rw\n{line}\n[2002]\nParameterName=Y\nDataType=5\nAccessType=ro"
+        );
+        let eds = Eds::parse(&text).unwrap();
+        assert_eq!(get(&eds, 0x2001, 0).default, value, "{line}");
+        assert_eq!(eds.warnings.iter().map(|warning| warning.line).collect::<Vec<_>>(), [Some(5)], "{line}");
+        assert_eq!(get(&eds, 0x2002, 0).name, "Y");
+    }
+}
+
+#[test]
+fn a_missing_key_is_replaced_with_a_warning() {
+    let cases = [
+        ("DataType=5\nAccessType=rw", "2001h", DataType(5), Access::ReadWrite),
+        ("ParameterName=X\nAccessType=rw", "X", DataType::DOMAIN, Access::ReadWrite),
+        ("ParameterName=X\nDataType=5", "X", DataType(5), Access::ReadOnly),
+        ("ParameterName=X\nDataType=5\nAccessType=R", "X", DataType(5), Access::ReadOnly),
+        ("ParameterName=X\nDataType=5\nAccessType=W", "X", DataType(5), Access::WriteOnly),
+    ];
+    for (lines, name, data_type, access) in cases {
+        let eds = Eds::parse(&format!("[2001]\n{lines}")).unwrap();
+        let entry = get(&eds, 0x2001, 0);
+        assert_eq!((&entry.name[..], entry.data_type, entry.access), (name, data_type, access), "{lines}");
+        assert_eq!(eds.warnings.len(), 1, "{lines}: {:?}", eds.warnings);
+    }
 }
 
 #[test]

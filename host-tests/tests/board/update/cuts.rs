@@ -123,7 +123,7 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
 }
 
 /// Without `--thorough`, one of this many operations is cut.
-const SAMPLE: u64 = 10;
+const SAMPLE: u64 = 20;
 
 /// Of the operations that keep A, one of this many is cut, except for those at the begin and the end.
 const KEEPING_SAMPLE: u64 = 2001;
@@ -145,7 +145,7 @@ fn is_cut(cut: u64, keeping: &Range<u64>) -> bool {
     }
 }
 
-/// Cuts at every operation whose number has this remainder modulo two, so that two processes share the work; at a tenth
+/// Cuts at every operation whose number has this remainder modulo two, so that two processes share the work; at a twentieth
 /// of the operations without `--thorough`.
 fn cut_everywhere(rest: u64) {
     let mut victim = Victim::new();

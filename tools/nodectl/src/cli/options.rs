@@ -28,8 +28,8 @@ pub struct Options {
     pub node: NodeSet,
 
     /// Data sheet of the node, or a folder of data sheets from which each node gets the one with its vendor-ID and product
-    /// code; else the one of this project.
-    #[arg(long, global = true, value_name = "FILE")]
+    /// code; else the folder nodectl/eds in the configuration of the user, and the data sheets of this project.
+    #[arg(long, global = true, env = "NODECTL_EDS", value_name = "FILE")]
     pub eds: Option<PathBuf>,
 
     /// Results as JSON: one value, or one a line where there are many.

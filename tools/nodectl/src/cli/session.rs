@@ -27,6 +27,9 @@ use crate::{Catalogue, Network, heartbeat};
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
 
+/// How many mistakes of a data sheet are printed.
+const WARNINGS: usize = 5;
+
 /// How long to listen before the first request. The frames of a running transfer come more often.
 const LISTEN: Duration = Duration::from_millis(50);
 
@@ -323,5 +326,17 @@ pub(super) fn sheet(path: &Path) -> Result<Eds, Failure> {
     if sheet.objects.is_empty() {
         return Err(Failure::file(path, "it is no data sheet: there is no object in it"));
     }
+    warn(path, &sheet);
     Ok(sheet)
+}
+
+/// Prints the first mistakes of a data sheet.
+fn warn(path: &Path, sheet: &Eds) {
+    for warning in sheet.warnings.iter().take(WARNINGS) {
+        note(format_args!("warning: {}: {}", path.display(), visible_lines(&warning.to_string())));
+    }
+    let more = sheet.warnings.len().saturating_sub(WARNINGS);
+    if more > 0 {
+        note(format_args!("warning: {}: and {more} more", path.display()));
+    }
 }

@@ -1,7 +1,8 @@
 //! The data sheets of `--eds`: one file, or a folder from which each node gets the data sheet of its identity.
 
-use std::fs;
-use std::path::Path;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::{env, fs, io};
 
 use eds::{DeviceInfo, Eds};
 
@@ -22,21 +23,18 @@ pub(super) enum Sheets {
 }
 
 impl Sheets {
-    /// Reads a file, or all data sheets in a folder. A file of a folder that is no data sheet is passed over.
+    /// Reads a file, or all data sheets in a folder. Without a path, those in the folder of the user, if there is one. A
+    /// file of a folder that is no data sheet is passed over.
     pub(super) fn read(path: Option<&Path>) -> Result<Sheets, Failure> {
-        let Some(path) = path else { return Ok(Sheets::None) };
+        let own = folder_of_user(|variable| env::var_os(variable));
+        let Some(path) = path.or_else(|| own.as_deref().filter(|own| is_used(own))) else {
+            return Ok(Sheets::None);
+        };
         if !path.is_dir() {
             return sheet(path).map(|sheet| Sheets::File(Box::new(sheet)));
         }
-        let entries = fs::read_dir(path).map_err(|error| Failure::file(path, error))?;
-        let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-        files.retain(|file| {
-            let ending = file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-            ["eds", "dcf"].contains(&ending.to_ascii_lowercase().as_str())
-        });
-        files.sort();
         let mut sheets = Vec::new();
-        for file in files {
+        for file in files(path).map_err(|error| Failure::file(path, error))? {
             match sheet(&file) {
                 Ok(sheet) => sheets.push(sheet),
                 Err(failure) => note(format_args!("passed over: {failure}")),
@@ -65,6 +63,30 @@ impl Sheets {
     pub(super) fn file(&self) -> Option<&Eds> {
         if let Sheets::File(sheet) = self { Some(sheet) } else { None }
     }
+}
+
+/// The data sheets in a folder, sorted by name.
+fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut files: Vec<_> = fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| {
+        let ending = file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        ["eds", "dcf"].contains(&ending.to_ascii_lowercase().as_str())
+    });
+    files.sort();
+    Ok(files)
+}
+
+/// The folder of data sheets in the configuration of the user (XDG Base Directory Specification; `%APPDATA%` on Windows).
+fn folder_of_user(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
+    let set = |name| variable(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let home = || set("HOME").map(|home| home.join(".config"));
+    let configuration = set("XDG_CONFIG_HOME").or_else(|| set("APPDATA")).or_else(home)?;
+    Some(configuration.join("nodectl").join("eds"))
+}
+
+/// Whether the folder of the user has data sheets.
+fn is_used(folder: &Path) -> bool {
+    files(folder).is_ok_and(|files| !files.is_empty())
 }
 
 /// Whether a data sheet tells for which device it is.
@@ -109,6 +131,21 @@ mod tests {
         assert_eq!(found(Some(1), Some(2)), Some(3));
         assert_eq!(found(Some(1), Some(5)), Some(9));
         assert_eq!(found(Some(2), Some(2)), None);
+    }
+
+    #[test]
+    fn the_folder_of_the_user_is_in_the_configuration() {
+        let folder = |set: &[(&str, &str)]| {
+            let set = set.to_vec();
+            folder_of_user(move |name| {
+                set.iter().find(|(one, _)| *one == name).map(|(_, value)| value.into())
+            })
+        };
+        let expected = |path: &str| Some(PathBuf::from(path));
+        assert_eq!(folder(&[("HOME", "/home/a")]), expected("/home/a/.config/nodectl/eds"));
+        assert_eq!(folder(&[("HOME", "/a"), ("XDG_CONFIG_HOME", "/b")]), expected("/b/nodectl/eds"));
+        assert_eq!(folder(&[("HOME", "/a"), ("XDG_CONFIG_HOME", "")]), expected("/a/.config/nodectl/eds"));
+        assert_eq!(folder(&[]), None);
     }
 
     #[test]
