@@ -96,6 +96,8 @@ pub struct Acquisition<'n> {
     state: Option<State>,
     /// The newest emergency of the node, in words.
     emergency: Option<String>,
+    /// Whether the node is one of this project, whose errors have names of their own.
+    is_own: bool,
     /// The number of frames of all nodes.
     frames: u64,
 }
@@ -128,6 +130,7 @@ impl<'n> Acquisition<'n> {
             due,
             state: None,
             emergency: None,
+            is_own: catalogue.is_of_this_project(),
             frames: 0,
         })
     }
@@ -211,7 +214,7 @@ impl<'n> Acquisition<'n> {
         if frame.id() == 0x80 + u16::from(self.setup.node.get())
             && let Ok(data) = frame.data().try_into()
         {
-            self.emergency = Some(meaning::emergency(Message::parse(data)));
+            self.emergency = Some(meaning::emergency(Message::parse(data), self.is_own));
         }
         if let Some(heard) = Heartbeat::parse(frame).filter(|heard| heard.node == self.setup.node) {
             self.state = Some(heard.state);

@@ -22,6 +22,7 @@ mod catalogue;
 pub mod check;
 pub mod cli;
 pub mod configuration;
+pub mod explain;
 pub mod heartbeat;
 pub mod lift;
 pub mod lss;

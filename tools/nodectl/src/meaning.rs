@@ -3,9 +3,9 @@
 use canopen::emcy::Message;
 use canopen::sdo::Multiplexer;
 
-use crate::Catalogue;
 use crate::unit::symbol;
 use crate::value::Value;
+use crate::{Catalogue, explain};
 
 /// The meaning of a value in words; `None` where the number itself is the meaning.
 #[must_use]
@@ -16,8 +16,9 @@ pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<Strin
     let Value::Integer(number) = value else { return None };
     let name = catalogue.name(at).unwrap_or_default().to_lowercase();
     if at.index == 0x1003 && at.sub > 0 {
-        let code = u16::try_from(number & 0xFFFF).ok()?;
-        return Some(format!("{code:04X}h {}", error_code(code)));
+        let [low, high, detail, _] = u32::try_from(*number).ok()?.to_le_bytes();
+        let code = u16::from_le_bytes([low, high]);
+        return Some(format!("{code:04X}h {}", error_name(code, detail, catalogue.is_of_this_project())));
     }
     if at.sub > 0 && name.contains("physical unit") {
         return Some(symbol(u32::try_from(*number).ok()?));
@@ -36,14 +37,16 @@ fn status(bits: i128) -> String {
 const REGISTER: [&str; 8] =
     ["generic", "current", "voltage", "temperature", "communication", "profile", "reserved", "manufacturer"];
 
-/// An emergency in words: code, error register, and the manufacturer's part.
+/// An emergency in words: code, error register, and the manufacturer's part. `is_own` is for a node of this project,
+/// whose codes have names of their own.
 #[must_use]
-pub fn emergency(message: Message) -> String {
+pub fn emergency(message: Message, is_own: bool) -> String {
     let Message { code, register, detail } = message;
     let bits = REGISTER.iter().enumerate().filter(|(bit, _)| register >> bit & 1 == 1);
     let bits: Vec<&str> = bits.map(|(_, name)| *name).collect();
     let bits = if bits.is_empty() { String::new() } else { format!(" ({})", bits.join(", ")) };
-    let text = format!("{code:04X}h {}, error register {register:02X}h{bits}", error_code(code));
+    let text =
+        format!("{code:04X}h {}, error register {register:02X}h{bits}", error_name(code, detail[0], is_own));
     if detail == [0; 5] {
         return text;
     }
@@ -86,7 +89,15 @@ const CODES: [(u16, u16, &str); 31] = [
     (0xFF00, 0xFF00, "device specific"),
 ];
 
-/// An emergency error code in words.
+/// An error in words, by the emergency error code and the first byte of the error field: for a node of this project by its
+/// own table, else by CiA 301.
+#[must_use]
+pub fn error_name(code: u16, detail: u8, is_own: bool) -> &'static str {
+    let own = explain::emergency(code, detail).filter(|_| is_own);
+    own.map_or_else(|| error_code(code), |row| row.name)
+}
+
+/// An emergency error code in words (CiA 301).
 #[must_use]
 pub fn error_code(code: u16) -> &'static str {
     CODES.iter().find(|row| code & row.1 == row.0).map_or("not defined by CiA 301", |row| row.2)

@@ -39,6 +39,9 @@ struct Report {
     error_register: Option<u32>,
     errors: Vec<u32>,
     program: Option<ProgramReport>,
+    /// Whether the node is one of this project, whose errors have names of their own.
+    #[serde(skip)]
+    is_own: bool,
 }
 
 /// The program of a node that can be updated (CiA 302-3).
@@ -82,6 +85,7 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
         error_register: number(session, node, 0x1001, 0)?,
         errors: errors(session, node)?,
         program: program(session, node)?,
+        is_own: session.catalogue(node)?.is_of_this_project(),
     })
 }
 
@@ -163,13 +167,10 @@ impl fmt::Display for Report {
         write!(f, "\n  error register    {register}")?;
         for error in &self.errors {
             // CiA 301, 7.5.2.4: the low half is the error code, the high half is the manufacturer's.
-            let code = u16::try_from(error & 0xFFFF).unwrap_or(0);
-            write!(
-                f,
-                "\n  error             {code:04X}h {}, {:04X}h",
-                meaning::error_code(code),
-                error >> 16
-            )?;
+            let [low, high, detail, _] = error.to_le_bytes();
+            let code = u16::from_le_bytes([low, high]);
+            let name = meaning::error_name(code, detail, self.is_own);
+            write!(f, "\n  error             {code:04X}h {name}, {:04X}h", error >> 16)?;
         }
         self.program.iter().try_for_each(|program| write!(f, "\n  program           {program}"))
     }

@@ -2,6 +2,7 @@
 
 mod check;
 mod dump;
+mod explain;
 mod failure;
 mod info;
 mod list;
@@ -76,6 +77,7 @@ enum Command {
     Rollback(trial::Rollback),
     Serve(serve::Serve),
     Check(check::Check),
+    Explain(explain::Explain),
     Completions(manual::Completions),
     Man(manual::Man),
 }
@@ -105,7 +107,7 @@ impl Cli {
             Command::Trace(trace) => trace.needs_a_bus(),
             Command::Rules(rules) => rules.needs_a_bus(),
             Command::Check(check) => check.needs_a_bus(),
-            Command::Completions(_) | Command::Man(_) => false,
+            Command::Explain(_) | Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
     }
@@ -139,6 +141,7 @@ impl Cli {
             Command::Rollback(rollback) => rollback.run(session),
             Command::Serve(_) => Err(Failure::Usage("it has sessions of its own".to_owned())),
             Command::Check(check) => check.run(session),
+            Command::Explain(explain) => explain.run(session),
             Command::Completions(completions) => completions.run(session),
             Command::Man(man) => man.run(session),
         }

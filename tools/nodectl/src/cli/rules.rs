@@ -13,6 +13,7 @@ use super::traffic::{Listening, Records};
 use super::{Failure, Session};
 use crate::rules::{self, Device};
 use crate::text::hex_digits;
+use crate::trace::Record;
 
 /// The longest wait for a frame, after which the end of the run is checked.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -174,7 +175,7 @@ impl Judge<'_> {
     fn file(&mut self, session: &mut Session, path: &Path) -> Result<(), Failure> {
         let mut begin = None;
         for record in Records::open(path)? {
-            let (at, frame) = record?;
+            let (at, Record::Frame(frame)) = record? else { continue };
             let begin = *begin.get_or_insert(at);
             let is_over = |seconds: u32| at.0.saturating_sub(begin.0) > u64::from(seconds) * 1_000_000;
             if self.rules.seconds.is_some_and(is_over) {

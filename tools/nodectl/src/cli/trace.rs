@@ -18,7 +18,7 @@ use super::{Failure, Session};
 use crate::Catalogue;
 use crate::scan::scan;
 use crate::text::{hex_digits, visible};
-use crate::trace::{Decoder, Kind, Knowledge, Line, Shown};
+use crate::trace::{Decoder, Kind, Knowledge, Line, Record, Shown};
 use crate::value::Value;
 
 /// The longest wait for a frame, after which the end of the trace is checked.
@@ -32,7 +32,7 @@ const LISTEN: Duration = Duration::from_millis(300);
 /// Nodes are asked first for the mapping of their PDOs and the units. Later changes are taken from the trace itself.
 #[derive(Debug, Args)]
 pub(super) struct Trace {
-    /// Decode a file of candump instead of the bus ("-" for the standard input). `--eds` is for the nodes of `--of`, or all.
+    /// Decode a log of candump, Vector (.asc) or PEAK (.trc) instead of the bus ("-" for the standard input). `--eds` is for the nodes of `--of`, or all.
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
 
@@ -65,7 +65,7 @@ pub(super) struct Trace {
 #[derive(Serialize)]
 struct Row {
     time: f64,
-    can_id: u16,
+    can_id: u32,
     kind: Kind,
     node: Option<u8>,
     text: String,
@@ -183,15 +183,24 @@ impl Printer<'_> {
         while self.left > 0
             && let Some(record) = records.next()
         {
-            let (at, frame) = record?;
-            self.frame(session, &frame, at)?;
+            match record? {
+                (at, Record::Frame(frame)) => self.frame(session, &frame, at)?,
+                (at, Record::Foreign(frame)) => {
+                    self.lines(session, vec![Decoder::on_foreign(frame, at)], at)?
+                }
+            }
         }
         Ok(())
     }
 
     fn frame(&mut self, session: &mut Session, frame: &Frame, at: Instant) -> Result<(), Failure> {
+        let lines = self.decoder.on_frame(frame, at);
+        self.lines(session, lines, at)
+    }
+
+    fn lines(&mut self, session: &mut Session, lines: Vec<Line>, at: Instant) -> Result<(), Failure> {
         let start = *self.start.get_or_insert(at);
-        for line in self.decoder.on_frame(frame, at) {
+        for line in lines {
             if self.left > 0 && self.trace.is_wanted(&line) {
                 self.left -= 1;
                 session.print(&row(line, start))?;

@@ -1,23 +1,24 @@
-//! The traffic that a command follows: that of the bus, or a file of candump.
+//! The traffic that a command follows: that of the bus, or a log of candump, Vector (.asc) or PEAK (.trc).
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use canopen::{Duration, Frame, Instant};
+use canopen::{Duration, Instant};
 
 use super::{Failure, Session};
 use crate::bus::Received;
-use crate::trace::parse_candump;
+use crate::trace::{LogReader, Record};
 
 /// The greatest length of a line of a file: ten times a line of candump.
 const LONGEST_LINE: u64 = 1024;
 
-/// The frames of a file of candump, with their times.
+/// The records of a log, with their times.
 pub(super) struct Records {
     path: PathBuf,
     input: BufReader<Box<dyn Read>>,
     line: u64,
+    reader: LogReader,
 }
 
 impl Records {
@@ -28,11 +29,16 @@ impl Records {
         } else {
             Box::new(File::open(path).map_err(|error| Failure::file(path, error))?)
         };
-        Ok(Records { path: path.to_owned(), input: BufReader::new(input), line: 0 })
+        Ok(Records {
+            path: path.to_owned(),
+            input: BufReader::new(input),
+            line: 0,
+            reader: LogReader::default(),
+        })
     }
 
-    /// The frame of the next line that has one; `None` at the end of the file.
-    fn read(&mut self) -> Result<Option<(Instant, Frame)>, Failure> {
+    /// The record of the next line that has one; `None` at the end of the file.
+    fn read(&mut self) -> Result<Option<(Instant, Record)>, Failure> {
         let mut bytes = Vec::new();
         loop {
             bytes.clear();
@@ -42,10 +48,9 @@ impl Records {
                 return Ok(None);
             }
             let text = String::from_utf8_lossy(&bytes);
-            if text.trim().is_empty() {
-                continue;
-            }
-            let record = parse_candump(text.trim())
+            let record = self
+                .reader
+                .line(&text)
                 .map_err(|error| Failure::file(&self.path, format!("line {}: {error}", self.line)))?;
             if record.is_some() {
                 return Ok(record);
@@ -55,7 +60,7 @@ impl Records {
 }
 
 impl Iterator for Records {
-    type Item = Result<(Instant, Frame), Failure>;
+    type Item = Result<(Instant, Record), Failure>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.read().transpose()

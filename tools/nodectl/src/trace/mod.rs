@@ -3,8 +3,8 @@
 //! A [`Decoder`] takes the frames in their order and describes each. A transfer of several frames is one [`Line`], made
 //! when the transfer ends. A heartbeat makes a line only when its state is new. The decoder sends nothing.
 
-mod candump;
 mod knowledge;
+mod log;
 mod pdo;
 mod sdo;
 mod services;
@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use canopen::sdo::Multiplexer;
 use canopen::{Frame, Instant, NodeId};
 
-pub use candump::{NotARecord, parse as parse_candump};
 pub use knowledge::Knowledge;
+pub use log::{Foreign, ForeignKind, LogReader, NotARecord, Record};
 
 use crate::Catalogue;
 use crate::text::hex_digits;
@@ -86,8 +86,8 @@ pub struct Shown {
 pub struct Line {
     /// Time of the frame on the bus; for a transfer, the time of its last frame.
     pub at: Instant,
-    /// The CAN-ID of the frame.
-    pub id: u16,
+    /// The identifier of the frame: a CAN-ID, or 29 bits of a frame that CANopen does not use.
+    pub id: u32,
     /// The service.
     pub kind: Kind,
     /// The node that sends or receives the frame; `None` where the CAN-ID does not tell it.
@@ -132,13 +132,28 @@ impl Decoder {
         self.pdos.forget(node);
     }
 
+    /// Whether a node is one of this project.
+    fn is_own(&self, node: Option<NodeId>) -> bool {
+        let known = node.and_then(|node| self.nodes.get(&node));
+        known.is_some_and(|known| known.catalogue().is_of_this_project())
+    }
+
+    /// The line of a frame that CANopen does not use.
+    #[must_use]
+    pub fn on_foreign(frame: Foreign, at: Instant) -> Line {
+        let Foreign { kind, id, data } = frame;
+        let text = format!("{}: {}", kind.name(), hex_digits(&data, " "));
+        let text = text.trim_end_matches(": ").to_owned();
+        Line { at, id, kind: Kind::Other, node: None, text, values: Vec::new(), abort: None, data }
+    }
+
     /// The lines of a frame. There is no line for a part of an unfinished transfer, and for a heartbeat without a
     /// change. There are two lines where a transfer begins before the former one has ended.
     pub fn on_frame(&mut self, frame: &Frame, at: Instant) -> Vec<Line> {
         let id = frame.id();
         let said = |kind, node, said: Said| Line {
             at,
-            id,
+            id: id.into(),
             kind,
             node,
             text: said.text,
@@ -159,7 +174,7 @@ impl Decoder {
                 let (node, text) = self.pdos.on_frame(frame, &self.nodes);
                 one(Kind::Pdo, node, Some(text))
             }
-            (0x081..=0x0FF, node) => one(Kind::Emcy, node, Some(services::emcy(frame))),
+            (0x081..=0x0FF, node) => one(Kind::Emcy, node, Some(services::emcy(frame, self.is_own(node)))),
             (0x581..=0x5FF | 0x601..=0x67F, Some(node)) => {
                 let known = self.nodes.entry(node).or_default();
                 let events = self.transfers.on_frame(node, frame, at);

@@ -46,9 +46,9 @@ pub(super) fn time(frame: &Frame) -> Said {
 }
 
 /// Emergencies (CiA 301, 7.2.7).
-pub(super) fn emcy(frame: &Frame) -> Said {
+pub(super) fn emcy(frame: &Frame, is_own: bool) -> Said {
     let Ok(data) = frame.data().try_into() else { return odd(frame, "no EMCY") };
-    Said::text(emergency(Message::parse(data)))
+    Said::text(emergency(Message::parse(data), is_own))
 }
 
 /// The last known state of each node.

@@ -223,13 +223,18 @@ impl Node {
         self.booted.map_or(f64::INFINITY, |booted| t - booted)
     }
 
+    /// Whether the node is one of this project.
+    fn is_own(&self) -> bool {
+        self.identity.as_ref().is_some_and(|identity| identity.personality.is_some())
+    }
+
     fn on_emergency(&mut self, node: NodeId, frame: &Frame, t: f64) -> Option<News> {
         let message = Message::parse(frame.data().try_into().ok()?);
         let emergency = Emergency {
             t,
             code: message.code,
             active: message.code & 0xFF00 != 0,
-            text: meaning::emergency(message),
+            text: meaning::emergency(message, self.is_own()),
         };
         (self.emergency, self.is_new) = (Some(emergency.clone()), true);
         Some(News::Emcy { node: node.get(), emergency })

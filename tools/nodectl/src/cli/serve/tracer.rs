@@ -32,7 +32,7 @@ pub(super) struct Tracer {
 #[derive(Serialize)]
 struct Shape<'l> {
     t: f64,
-    id: u16,
+    id: u32,
     kind: Kind,
     node: Option<u8>,
     text: &'l str,
