@@ -15,7 +15,7 @@ from pathlib import Path
 
 import error_budget
 import pytest
-from simulator import PATIENCE, Simulator
+from simulator import ONCE_MORE, PATIENCE, Simulator
 
 ROOT = Path(__file__).parent.parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -57,11 +57,12 @@ class Thread:
         self._succeeds("\n".join(line for line in lines if not line.startswith("cargo sim")))
 
     def _wait_for_the_boards(self) -> None:
-        """A user types slower than a board boots."""
-        waiting = [f"nodectl --node {node} read 1000h" for node in self.simulator.devices] or ["nodectl lss scan"]
-        for command in waiting:
+        """A user types slower than a board boots. Boards without a node-ID send nothing that shows it."""
+        if not self.simulator.devices:
+            time.sleep(ONCE_MORE)
+        for node in self.simulator.devices:
             until = time.monotonic() + PATIENCE
-            while self._bash(command).returncode and time.monotonic() < until:
+            while self._bash(f"nodectl --node {node} read 1000h").returncode and time.monotonic() < until:
                 pass
 
     def _bash(self, commands: str) -> subprocess.CompletedProcess:
