@@ -1,0 +1,173 @@
+"""The documents: commands are run as they are written, in their order, and links, paths and figures are right.
+
+A fenced block with `{test=NAME}` after its language is run. The blocks of one name in one document share a simulator,
+which a line `cargo sim` starts with its flags. `sh` blocks run in bash, `python` blocks in this interpreter, and the lines
+of `text` blocks are typed into the simulator's terminal.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import error_budget
+import pytest
+from simulator import ONCE_MORE, PATIENCE, Simulator
+
+ROOT = Path(__file__).parent.parent.parent
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"^```(\w+) \{test=(\w+)\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+Block = tuple[str, str]
+
+
+def threads() -> dict[str, list[Block]]:
+    """The blocks of each thread, by the name of the document and of the thread."""
+    found: dict[str, list[Block]] = {}
+    for document in DOCUMENTS:
+        for language, name, text in BLOCK.findall(document.read_text(encoding="utf-8")):
+            found.setdefault(f"{document.stem}-{name}", []).append((language, text))
+    return found
+
+
+class Thread:
+    """A user who follows a document."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.simulator: Simulator | None = None
+        # The documents call `nodectl` by its name.
+        (folder / "bin").mkdir()
+        (folder / "bin" / "nodectl").symlink_to(Path(os.environ["NODECTL_COMMAND"]).resolve())
+
+    def run(self, language: str, text: str) -> None:
+        getattr(self, language)(text)
+
+    def sh(self, text: str) -> None:
+        text = text.replace("cargo run -q -p nodectl --", "nodectl")
+        text = text.replace("target/thumbv7em-none-eabihf/release", os.environ["NODE_IMAGES"])
+        lines = text.splitlines()
+        for line in [line for line in lines if line.startswith("cargo sim")]:
+            assert self.simulator is None, "the thread has a simulator"
+            self.simulator = Simulator(*shlex.split(line, comments=True)[2:], speed="real")
+            self._wait_for_the_boards()
+        self._succeeds("\n".join(line for line in lines if not line.startswith("cargo sim")))
+
+    def _wait_for_the_boards(self) -> None:
+        """A user types slower than a board boots. Boards without a node-ID send nothing that shows it."""
+        if not self.simulator.devices:
+            time.sleep(ONCE_MORE)
+        for node in self.simulator.devices:
+            until = time.monotonic() + PATIENCE
+            while self._bash(f"nodectl --node {node} read 1000h").returncode and time.monotonic() < until:
+                pass
+
+    def _bash(self, commands: str) -> subprocess.CompletedProcess:
+        path = f"{self.folder / 'bin'}:{os.environ['PATH']}"
+        bus = f"socketcand://127.0.0.1:{self.simulator.socketcand}/vcan0"
+        return self._run(["bash", "-exc", commands], self.folder, {**os.environ, "PATH": path, "NODECTL_BUS": bus})
+
+    def _succeeds(self, commands: str) -> None:
+        run = self._bash(commands)
+        assert run.returncode == 0, f"{run.stdout}{run.stderr}"
+
+    def python(self, text: str) -> None:
+        assert "29536" in text, "the port of the simulator"
+        text = text.replace("29536", str(self.simulator.socketcand))
+        run = self._run([sys.executable, "-c", text], ROOT, dict(os.environ))
+        assert run.returncode == 0, f"{run.stdout}{run.stderr}"
+
+    def text(self, text: str) -> None:
+        for line in text.splitlines():
+            self.simulator.command(line)
+
+    def end(self) -> None:
+        assert self.simulator is not None, "the first line of a thread starts a simulator"
+        assert self.simulator.quit()["bus"]["errors"] == 0
+
+    @staticmethod
+    def _run(command: list[str], folder: Path, environment: dict[str, str]) -> subprocess.CompletedProcess:
+        return subprocess.run(
+            command, cwd=folder, env=environment, timeout=PATIENCE, capture_output=True, text=True, check=False
+        )
+
+
+@pytest.mark.parametrize("name", threads())
+def test_the_commands_of_a_thread_succeed_in_their_order(name: str, tmp_path: Path):
+    thread = Thread(tmp_path)
+    for language, text in threads()[name]:
+        thread.run(language, text)
+    thread.end()
+
+
+def test_commands_are_tagged():
+    """A document whose commands are run has no untagged block with a command of `nodectl`."""
+    for document in DOCUMENTS:
+        text = document.read_text(encoding="utf-8")
+        if BLOCK.search(text):
+            untagged = [block for block in re.findall(r"^```\n(.*?)^```", text, re.M | re.S) if "\nnodectl " in f"\n{block}"]
+            assert not untagged, f"{document.name}: {untagged}"
+
+
+def anchors(text: str) -> set[str]:
+    """The anchors of the headings, as GitHub makes them."""
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    plain = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading) for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in plain}
+
+
+def links(document: Path) -> list[str]:
+    text = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    return re.findall(r"\]\(([^)#\s]*(?:#[^)\s]*)?)\)", re.sub(r"`[^`\n]*`", "", text))
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: document.name)
+def test_links_lead_to_files_and_headings(document: Path):
+    broken = []
+    for link in links(document):
+        if re.match(r"https?:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (document.parent / path).resolve() if path else document
+        if not target.exists() or (anchor and anchor not in anchors(target.read_text(encoding="utf-8"))):
+            broken.append(link)
+    assert not broken
+
+
+def test_the_error_budget_is_that_of_its_circuits():
+    text = (ROOT / "docs" / "wiring.md").read_text(encoding="utf-8")
+    stated = text.split("<!-- begin error budget -->\n")[1].split("\n<!-- end error budget -->")[0]
+    assert stated == error_budget.table()
+
+
+def test_every_emergency_code_is_explained():
+    """docs/troubleshooting.md has a row for each code and each detail that the firmware sends, and for no other."""
+    rows = [line.split(",") for line in (ROOT / "host-tests/tables/emcy.csv").read_text().splitlines()[1:]]
+    sent = {row[0][2:] + "h" for row in rows if row[5] or row[0] == "0x0000"}
+    text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    section = text.split("## EMCY codes")[1].split("\n## ")[0]
+    explained = set(re.findall(r"^\| ([0-9A-F]{4}h)", section, re.MULTILINE))
+    assert explained == sent
+
+
+def test_every_abort_code_is_explained():
+    source = (ROOT / "crates/canopen/src/sdo/abort.rs").read_text(encoding="utf-8")
+    known = {f"{a} {b}h" for a, b in re.findall(r"=> 0x([0-9A-F]{4})_([0-9A-F]{4}),", source)}
+    text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    section = text.split("## SDO abort codes")[1].split("\n## ")[0]
+    assert set(re.findall(r"^\| ([0-9A-F]{4} [0-9A-F]{4}h)", section, re.MULTILINE)) == known
+
+
+def test_the_figures_of_the_readme_are_those_of_the_benchmark():
+    benchmark = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8").split("## As flashed")[1]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([^|]+) \| ([\d,]+) \| ([\d,]+) \|$", readme.split("## Why")[1].split("\n## ")[0], re.MULTILINE)
+    assert rows
+    for operation, ours, theirs in rows:
+        row = re.search(rf"^\| {re.escape(operation)} \| (\d+) \|.*\| (\d+) \|$", benchmark, re.MULTILINE)
+        assert row, operation
+        assert (ours.replace(",", ""), theirs.replace(",", "")) == row.groups(), operation
