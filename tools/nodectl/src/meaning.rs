@@ -94,7 +94,7 @@ const CODES: [(u16, u16, &str); 31] = [
 #[must_use]
 pub fn error_name(code: u16, detail: u8, is_own: bool) -> &'static str {
     let own = explain::emergency(code, detail).filter(|_| is_own);
-    own.map_or_else(|| error_code(code), |row| row.name)
+    own.map_or_else(|| error_code(code), |row| row.name.as_str())
 }
 
 /// An emergency error code in words (CiA 301).

@@ -2,11 +2,12 @@
 
 use std::fmt;
 
+use canopen::sdo::Abort;
 use clap::Args;
 use serde::Serialize;
 
 use super::{Failure, Session};
-use crate::explain::{EMERGENCIES, abort, emergencies, reason};
+use crate::explain::{self, abort, emergencies};
 use crate::meaning::error_code;
 
 /// Explains an EMCY code (four hexadecimal digits) or an SDO abort code (eight): meaning, cause and remedy.
@@ -22,9 +23,9 @@ pub(super) struct Explain {
 #[derive(Serialize)]
 struct Meaning {
     code: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
     detail: Option<u8>,
-    meaning: &'static str,
+    meaning: String,
+    field: &'static str,
     cause: &'static str,
     remedy: &'static str,
 }
@@ -44,35 +45,37 @@ impl Explain {
     }
 
     fn meanings(&self) -> Result<Vec<Meaning>, Failure> {
-        let Some(text) = &self.code else { return Ok(EMERGENCIES.iter().map(of_row).collect()) };
-        let unknown =
-            || Failure::Usage(format!("{text:?} is no code that CiA 301 or a node of this project has"));
+        let Some(text) = &self.code else { return Ok(emergencies().iter().map(Meaning::of_row).collect()) };
         match code(text) {
             Some(Code::Emergency(code)) => {
-                let own: Vec<Meaning> = emergencies(code).map(of_row).collect();
-                let class = Meaning {
-                    code: format!("EMCY {code:04X}h"),
-                    detail: None,
-                    meaning: error_code(code),
-                    cause: "",
-                    remedy: "",
-                };
-                Ok(if own.is_empty() { vec![class] } else { own })
+                let rows = emergencies().iter().filter(|row| row.code == code);
+                let own: Vec<Meaning> = rows.map(Meaning::of_row).collect();
+                let of_class = || vec![Meaning::new(format!("EMCY {code:04X}h"), error_code(code))];
+                Ok(if own.is_empty() { of_class() } else { own })
             }
             Some(Code::Abort(code)) => {
-                let reason = reason(code).ok_or_else(unknown)?;
-                let (cause, remedy) = abort(reason);
-                let code = format!("SDO abort {:04X} {:04X}h", code >> 16, code & 0xFFFF);
-                Ok(vec![Meaning { code, detail: None, meaning: reason.meaning(), cause, remedy }])
+                let name = format!("SDO abort {:04X} {:04X}h", code >> 16, code & 0xFFFF);
+                let known = Abort::ALL.into_iter().find(|abort| abort.code() == code);
+                let meaning = known.map_or("not defined by CiA 301", Abort::meaning);
+                let (cause, remedy) = abort(code).map_or(("", ""), |row| (&row.cause, &row.remedy));
+                Ok(vec![Meaning { cause, remedy, ..Meaning::new(name, meaning) }])
             }
-            None => Err(unknown()),
+            None => Err(Failure::Usage(format!(
+                "{text:?} is no code: four hexadecimal digits of an EMCY, or eight of an abort"
+            ))),
         }
     }
 }
 
-fn of_row(row: &crate::explain::Emergency) -> Meaning {
-    let code = format!("EMCY {:04X}h", row.code);
-    Meaning { code, detail: row.detail, meaning: row.name, cause: row.cause, remedy: row.remedy }
+impl Meaning {
+    fn new(code: String, meaning: impl Into<String>) -> Meaning {
+        Meaning { code, detail: None, meaning: meaning.into(), field: "", cause: "", remedy: "" }
+    }
+
+    fn of_row(row: &'static explain::Emergency) -> Meaning {
+        let explain::Emergency { code, detail, name, field, cause, remedy, .. } = row;
+        Meaning { detail: *detail, field, cause, remedy, ..Meaning::new(format!("EMCY {code:04X}h"), name) }
+    }
 }
 
 /// The code in a text, by its number of digits.
@@ -90,16 +93,15 @@ fn code(text: &str) -> Option<Code> {
 
 impl fmt::Display for Meaning {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Meaning { code, detail, meaning, cause, remedy } = self;
+        let Meaning { code, detail, meaning, field, cause, remedy } = self;
         write!(f, "{code}")?;
         if let Some(detail) = detail {
             write!(f, ", first byte of the error field {detail}")?;
         }
         write!(f, ": {meaning}")?;
-        for (name, text) in
-            [("cause", cause), ("remedy", remedy)].into_iter().filter(|(_, text)| !text.is_empty())
-        {
-            write!(f, "\n  {name:<7} {text}")?;
+        let parts = [("error field", field), ("cause", cause), ("remedy", remedy)];
+        for (name, text) in parts.into_iter().filter(|(_, text)| !text.is_empty()) {
+            write!(f, "\n  {name:<11} {text}")?;
         }
         Ok(())
     }

@@ -177,7 +177,11 @@ impl Decoder {
             (0x081..=0x0FF, node) => one(Kind::Emcy, node, Some(services::emcy(frame, self.is_own(node)))),
             (0x581..=0x5FF | 0x601..=0x67F, Some(node)) => {
                 let known = self.nodes.entry(node).or_default();
+                let is_within = self.transfers.has(node);
                 let events = self.transfers.on_frame(node, frame, at);
+                if events.is_empty() && !is_within && !self.transfers.has(node) {
+                    return one(Kind::Sdo, Some(node), Some(sdo::without_begin(frame)));
+                }
                 let lines = events.into_iter().map(|event| {
                     self.pdos.note(node, known, &event);
                     said(Kind::Sdo, Some(node), event.say(known, node))

@@ -6,7 +6,7 @@ use canopen::client::sdo::AbortCode;
 use canopen::sdo::{BlockEnd, BlockSegment, Initiate, Multiplexer, Request, Response};
 use canopen::{Frame, Instant, NodeId};
 
-use super::{Knowledge, Said, Shown, equals, value};
+use super::{Knowledge, Said, Shown, equals, hex, value};
 use crate::object::Place;
 
 /// The number of bytes of a transfer that are kept. Further bytes are only counted.
@@ -164,6 +164,11 @@ impl Transfers {
     fn end(&mut self, node: NodeId, end: End, now: Instant) -> Option<Transferred> {
         self.0.remove(&node).map(|transfer| transfer.ended(end, now))
     }
+}
+
+/// A frame of a transfer whose begin is not in the trace, or that is no SDO message.
+pub(super) fn without_begin(frame: &Frame) -> Said {
+    Said::text(format!("part of a transfer without its begin: {}", hex(frame)))
 }
 
 impl Transfer {

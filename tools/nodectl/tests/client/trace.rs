@@ -40,7 +40,7 @@ fn services_in_words() {
             0x085,
             &[0x30, 0x81, 0x11, 0, 0, 0, 0, 0],
             Kind::Emcy,
-            "8130h heartbeat or life guarding error, error register 11h (generic, communication)",
+            "8130h heartbeat of a watched node is missing, error register 11h (generic, communication)",
         ),
         (
             0x085,
@@ -212,7 +212,7 @@ fn a_file_of_candump_needs_no_bus() {
     let wire = Wire::new(Pressure::new(1));
     assert_eq!(
         printed(&wire, &["trace", "--file", file]),
-        "  0.000000 701h heartbeat   1  boot-up\n  1.000000 000h nmt         -  start all nodes\n"
+        "  0.000000 701h heartbeat   1  boot-up\n  0.500000 701h other       -  29-bit identifier: 00\n  1.000000 000h nmt         -  start all nodes\n"
     );
     let only = printed(&wire, &["trace", "--file", file, "--kind", "nmt", "--json"]);
     let only: serde_json::Value = serde_json::from_str(&only).expect("JSON");
@@ -223,6 +223,27 @@ fn a_file_of_candump_needs_no_bus() {
     assert!(code == 7 && error.contains("line 2: no record of candump"), "{error}");
     fs::remove_file(&path).unwrap();
     assert_eq!(failed(&wire, &["trace", "--file", file]).0, 7);
+}
+
+/// The same boot-up message and command in the logs of three programs.
+#[test]
+fn logs_of_other_programs_are_read() {
+    let logs = [
+        "# a comment\n(2026-11-25 12:00:00.000000)  can0  RX - -  701   [1]  00\n(2026-11-25 12:00:01.000000)  can0  000   [2]  01 00\n",
+        "base hex  timestamps absolute\n 5.000000 1 701 Rx d 1 00\n 6.000000 1 000 Tx d 2 01 00\n",
+        ";$FILEVERSION=1.1\n 1) 1000.0 Rx 0701 1 00\n 2) 2000.0 Tx 0000 2 01 00\n",
+    ];
+    let wire = Wire::new(Pressure::new(1));
+    for (number, log) in logs.iter().enumerate() {
+        let path = std::env::temp_dir().join(format!("nodectl-log-{}-{number}.log", std::process::id()));
+        fs::write(&path, log).unwrap();
+        assert_eq!(
+            printed(&wire, &["trace", "--file", path.to_str().expect("a path")]),
+            "  0.000000 701h heartbeat   1  boot-up\n  1.000000 000h nmt         -  start all nodes\n",
+            "{log}"
+        );
+        fs::remove_file(&path).unwrap();
+    }
 }
 
 #[test]
