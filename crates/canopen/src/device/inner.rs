@@ -11,7 +11,7 @@ use crate::lss::Identity;
 use crate::nmt::State;
 use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
 use crate::transmit::Context;
-use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync, time_stamp};
+use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_stamp};
 
 /// Identity object.
 const IDENTITY: u16 = 0x1018;
@@ -23,8 +23,8 @@ pub(super) struct Inner<D: Definition> {
     pub(super) node_id: Option<NodeId>,
     pub(super) state: State,
     /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
-    pub(super) process_due: Instant,
-    pub(super) services_due: Instant,
+    pub(super) process_due: Tick,
+    pub(super) services_due: Tick,
     pub(super) heartbeat: heartbeat::Producer,
     pub(super) guarding: heartbeat::Guarding,
     pub(super) pending: Pending,
@@ -72,8 +72,8 @@ impl<D: Definition> Inner<D> {
             dictionary,
             node_id,
             state: State::Initialising,
-            process_due: Instant::NEVER,
-            services_due: Instant::NEVER,
+            process_due: Tick::NEVER,
+            services_due: Tick::NEVER,
             heartbeat: heartbeat::Producer::new(),
             guarding: heartbeat::Guarding::new(),
             pending: Pending::new(),
@@ -99,6 +99,33 @@ impl<D: Definition> Inner<D> {
         }
     }
 
+    /// The epoch of the clock has moved.
+    pub(super) fn shift(&mut self, by: Span) {
+        self.process_due.shift(by);
+        self.services_due.shift(by);
+        self.heartbeat.shift(by);
+        if Self::has(Services::GUARDING) {
+            self.guarding.shift(by);
+        }
+        if Self::has(Services::HEARTBEAT_CONSUMER) {
+            self.watches.shift(by);
+        }
+        if Self::has(Services::SYNC) {
+            self.sync.shift(by);
+        }
+        if Self::has(Services::SYNC_PRODUCER) {
+            self.sync_producer.shift(by);
+        }
+        if Self::has(Services::EMCY) {
+            self.emcy.shift(by);
+        }
+        self.tpdos.as_mut().iter_mut().for_each(|tpdo| tpdo.shift(by));
+        self.rpdos.as_mut().iter_mut().for_each(|rpdo| rpdo.shift(by));
+        if Self::has(Services::MULTIPLEXED_TPDO) {
+            self.scanner.shift(by);
+        }
+    }
+
     /// Whether the device has a service. The compiler removes the code of any other.
     pub(super) const fn has(service: Services) -> bool {
         D::SERVICES.contains(service)
@@ -120,7 +147,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Makes the services due at this instant, or earlier.
-    pub(super) fn serve_until(&mut self, due: Instant) {
+    pub(super) fn serve_until(&mut self, due: Tick) {
         self.services_due = self.services_due.min(due);
     }
 
@@ -209,7 +236,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Hands all protocols their parameters from the dictionary.
-    pub(super) fn configure(&mut self, now: Instant) {
+    pub(super) fn configure(&mut self, now: Tick) {
         if Self::has(Services::SYNC) {
             self.configure_sync(now);
         }
@@ -266,9 +293,9 @@ impl<D: Definition> Inner<D> {
     }
 
     /// The next deadline of `poll_errors`.
-    pub(super) fn errors_due(&self) -> Instant {
+    pub(super) fn errors_due(&self) -> Tick {
         let is_sent = Self::has(Services::EMCY) && self.state.has_services();
-        let emcy = if is_sent { self.emcy.due() } else { Instant::NEVER };
+        let emcy = if is_sent { self.emcy.due() } else { Tick::NEVER };
         let due = if Self::has(Services::GUARDING) { emcy.min(self.guarding.due()) } else { emcy };
         if Self::has(Services::HEARTBEAT_CONSUMER) { due.min(self.watches.due()) } else { due }
     }

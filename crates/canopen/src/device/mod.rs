@@ -37,7 +37,8 @@ pub use store::{Job, Soundness, Stored};
 use crate::dictionary::Dictionary;
 use crate::lss::BitRate;
 use crate::nmt::State;
-use crate::{Instant, NodeId};
+use crate::time::Clock;
+use crate::{Instant, NodeId, Tick};
 use inner::Inner;
 use services::Services;
 
@@ -47,6 +48,7 @@ use services::Services;
 pub struct Device<D: Definition> {
     services: Services<D>,
     inner: Inner<D>,
+    clock: Clock,
 }
 
 impl<D: Definition> core::fmt::Debug for Device<D> {
@@ -63,7 +65,7 @@ impl<D: Definition> core::fmt::Debug for Device<D> {
 pub type ServiceDevice<A, const N: usize> = Device<Rows<A, N, 0, 0, 0, 0, 0>>;
 
 /// A deadline in the past: the next poll checks everything.
-const STALE: Instant = Instant(0);
+const STALE: Tick = Tick(0);
 
 impl<D: Definition> Device<D> {
     /// A device that has not started: it neither sends nor receives until [`start`](Device::start). The bit rate is only
@@ -74,7 +76,11 @@ impl<D: Definition> Device<D> {
         application: D::Application,
     ) -> Device<D> {
         let node_id = node_id.into();
-        Device { services: Services::new(node_id), inner: Inner::new(dictionary, node_id, application) }
+        Device {
+            services: Services::new(node_id),
+            inner: Inner::new(dictionary, node_id, application),
+            clock: Clock::new(),
+        }
     }
 
     /// Sets the configured bit rate. LSS stores it together with a new node-ID.
@@ -89,6 +95,22 @@ impl<D: Definition> Device<D> {
     /// the bit rate sets it here.
     pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
         self.services.set_bus_bit_rate(bit_rate);
+    }
+
+    /// The present inside the device.
+    #[inline]
+    fn tick(&mut self, now: Instant) -> Tick {
+        self.clock.tick(now).unwrap_or_else(|| self.follow(now))
+    }
+
+    /// Moves the epoch of the clock, and all ticks with it.
+    #[cold]
+    #[inline(never)]
+    fn follow(&mut self, now: Instant) -> Tick {
+        let (now, by) = self.clock.follow(now);
+        self.services.shift(by);
+        self.inner.shift(by);
+        now
     }
 
     /// The node-ID in use.

@@ -8,7 +8,7 @@ use super::store::{check_program_control, command};
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
-use crate::{Instant, emcy, sync, time_stamp};
+use crate::{Tick, emcy, sync, time_stamp};
 
 impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
@@ -38,7 +38,7 @@ impl<D: Definition> Objects for Inner<D> {
         Ok(if entry.is_domain() { Writable::Stream } else { Writable::Value(entry.field.size.into()) })
     }
 
-    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Tick) -> Result<(), Abort> {
         let found = self.dictionary.find(at.index, at.sub);
         // By reference: a move out of the result takes a dozen instructions.
         let entry = found.as_ref().map_err(|abort| *abort)?;
@@ -83,7 +83,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Writes an entry whose values the application accepts or refuses.
-    fn write_handled(&mut self, entry: &Entry, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+    fn write_handled(&mut self, entry: &Entry, bytes: &[u8], now: Tick) -> Result<(), Abort> {
         self.application.write(entry, bytes, self.image.as_mut())?;
         entry.field.set(self.image.as_mut(), bytes);
         self.pending.parameters_changed();
@@ -97,7 +97,7 @@ impl<D: Definition> Inner<D> {
     /// Writes an entry whose rule does more than storing a value: everything that can refuse the value comes before
     /// any effect.
     #[inline(never)]
-    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Tick) -> Result<(), Abort> {
         let rule = entry.rule();
         self.check(entry, value)?;
         if !rule.is_computed() && !rule.is_command() {
@@ -169,7 +169,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Hands a new value to the protocol that uses it, or carries out a command.
-    fn apply(&mut self, entry: &Entry, value: u32, now: Instant) {
+    fn apply(&mut self, entry: &Entry, value: u32, now: Tick) {
         match entry.rule() {
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),

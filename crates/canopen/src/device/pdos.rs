@@ -14,7 +14,7 @@ use crate::pdo::{
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CobId, Instant};
+use crate::{CobId, Tick};
 
 /// A PDO of the dictionary, by the index of its communication object.
 ///
@@ -56,7 +56,7 @@ impl Pdo {
 
 impl<D: Definition> Inner<D> {
     /// Gives every PDO its settings.
-    pub(super) fn configure_pdos(&mut self, now: Instant) {
+    pub(super) fn configure_pdos(&mut self, now: Tick) {
         for direction in Self::directions() {
             for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
                 self.configure_one(pdo, place, now);
@@ -77,7 +77,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Gives the PDO to which the entry belongs its settings.
-    pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Instant) {
+    pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Tick) {
         let pdo = Pdo::of(entry);
         if let Some(place) = self.place(pdo) {
             self.configure_one(pdo, place, now);
@@ -87,7 +87,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Reconfigures the PDOs that the application has switched on or off.
-    pub(super) fn apply_application_changes(&mut self, now: Instant) {
+    pub(super) fn apply_application_changes(&mut self, now: Tick) {
         let mut has_changed = false;
         for direction in Self::directions() {
             for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
@@ -134,7 +134,7 @@ impl<D: Definition> Inner<D> {
         self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
 
-    fn configure_one(&mut self, pdo: Pdo, place: u16, now: Instant) {
+    fn configure_one(&mut self, pdo: Pdo, place: u16, now: Tick) {
         match pdo.direction() {
             Direction::Transmit => self.configure_tpdo(pdo, place),
             Direction::Receive if Self::has(Services::RPDO) => self.configure_rpdo(pdo, place, now),
@@ -153,7 +153,7 @@ impl<D: Definition> Inner<D> {
         }
     }
 
-    fn configure_rpdo(&mut self, pdo: Pdo, place: u16, now: Instant) {
+    fn configure_rpdo(&mut self, pdo: Pdo, place: u16, now: Tick) {
         let settings = self.rpdo_settings(pdo);
         if let Some(rpdo) = self.rpdos.as_mut().get_mut(usize::from(place)) {
             rpdo.configure(settings);

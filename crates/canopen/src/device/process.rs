@@ -7,38 +7,42 @@ use crate::dictionary::Services;
 use crate::nmt::Command;
 use crate::pdo::{Chain, ProcessContext, Rpdo, Tpdo};
 use crate::time_stamp::TimeOfDay;
-use crate::{CanId, Duration, Frame, Instant, Transmit};
+use crate::{CanId, Frame, Instant, Span, Tick, Transmit};
 
 impl<D: Definition> Device<D> {
     /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
         if self.is_request(frame) {
-            let _ = self.poll_process(now, out);
-            return self.on_service_frame(frame, now, out);
+            self.send_due_process(now, out);
+        } else {
+            self.take_process_frame(frame, now, out);
         }
-        self.take_process_frame(frame, now, out);
-        self.take_other_service(frame, now, out);
+        self.take_service_frame(frame, now, out);
         self.services_next()
     }
 
     /// Sends all frames that are due, in both halves.
     #[inline]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        let _ = self.poll_process(now, out);
-        self.poll_services(now, out)
+        let now = self.tick(now);
+        self.send_due_process(now, out);
+        self.send_due_services(now, out);
+        self.services_next()
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
     // Inlined, so that a caller that ignores a part of `Next` does not pay for it. The work is in a separate function.
     #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
         self.take_process_frame(frame, now, out);
         self.process_next()
     }
 
     #[inline(never)]
-    fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    fn take_process_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         let is_nmt = frame.id() == CanId::NMT.get();
         if is_nmt {
             self.on_nmt(frame);
@@ -66,11 +70,17 @@ impl<D: Definition> Device<D> {
     /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
+        self.send_due_process(now, out);
+        self.process_next()
+    }
+
+    #[inline]
+    fn send_due_process(&mut self, now: Tick, out: &mut impl Transmit) {
         if Inner::<D>::has_process() && now >= self.inner.process_due {
             let context = &mut self.services.process_context(now, out);
-            self.inner.send_process(context);
+            self.inner.run_process(context);
         }
-        self.process_next()
     }
 
     /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
@@ -81,6 +91,7 @@ impl<D: Definition> Device<D> {
         out: &mut impl Transmit,
         update: impl FnOnce(&mut D::Application, &mut [u8]),
     ) -> Next {
+        let now = self.tick(now);
         self.show(update);
         self.send_changes(now, out);
         self.process_next()
@@ -89,6 +100,7 @@ impl<D: Definition> Device<D> {
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
         let context = &mut self.services.process_context(now, out);
         let place = self.inner.tpdo_place(tpdo);
         if self.inner.state.has_pdos()
@@ -103,11 +115,12 @@ impl<D: Definition> Device<D> {
 
     /// Sends the time stamp, if bit 30 of 1012h is set and the NMT state allows it. Returns whether it is sent.
     pub fn send_time(&mut self, time: TimeOfDay, now: Instant, out: &mut impl Transmit) -> bool {
+        let now = self.tick(now);
         let context = &mut self.services.process_context(now, out);
         self.inner.time_frame(time).is_some_and(|frame| context.send(frame))
     }
 
-    fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn send_changes(&mut self, now: Tick, out: &mut impl Transmit) {
         let context = &mut self.services.process_context(now, out);
         self.inner.self_start(context);
         if self.inner.state.has_pdos() {
@@ -180,7 +193,7 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::SYNC) {
             self.poll_sync(context.now);
         }
-        let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Instant::NEVER };
+        let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Tick::NEVER };
         self.each_tpdo(Chain::Valid, |tpdo, image| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
@@ -198,6 +211,6 @@ impl<D: Definition> Inner<D> {
         }
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
         debug_assert!(due > context.now, "process data are still due after a poll");
-        self.process_due = due.max(context.now.plus(Duration(1)));
+        self.process_due = due.max(context.now.plus(Span(1)));
     }
 }

@@ -9,7 +9,7 @@ use crate::lss::{self, BitRate};
 use crate::pdo::{Budget, ProcessContext};
 use crate::sdo::{Abort, Server};
 use crate::transmit::{Context, RETRY};
-use crate::{CanId, Frame, Instant, NodeId, Transmit};
+use crate::{CanId, Frame, Instant, NodeId, Span, Tick, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
 const SDO_RESPONSE: u16 = 0x580;
@@ -23,9 +23,9 @@ pub(super) struct Services<D: Definition> {
     /// request.
     sdo_request: FullFrameId,
     /// When to send a reply of the server again that found the queue full.
-    reply_due: Instant,
+    reply_due: Tick,
     /// When to continue a block that found the queue full.
-    block_due: Instant,
+    block_due: Tick,
     lss: LssSlave,
     /// The share of process data in the bus.
     budget: Budget,
@@ -36,8 +36,8 @@ impl<D: Definition> Services<D> {
         Services {
             server: Server::new(),
             sdo_request: sdo_request(node_id),
-            reply_due: Instant::NEVER,
-            block_due: Instant::NEVER,
+            reply_due: Tick::NEVER,
+            block_due: Tick::NEVER,
             lss: LssSlave::new(node_id),
             budget: Budget::new(BitRate::FASTEST.kbit()),
         }
@@ -72,24 +72,37 @@ impl<D: Definition> Services<D> {
     /// Whether no client waits for a response, except for that of a job.
     pub(super) fn is_between_requests(&self) -> bool {
         let waits = self.reply_due.min(self.block_due).min(self.lss.due());
-        self.server.is_between_requests() && waits == Instant::NEVER
+        self.server.is_between_requests() && waits == Tick::NEVER
+    }
+
+    /// The epoch of the clock has moved.
+    pub(super) fn shift(&mut self, by: Span) {
+        self.server.shift(by);
+        self.reply_due.shift(by);
+        self.block_due.shift(by);
+        if D::Application::LSS {
+            self.lss.shift(by);
+        }
+        if Inner::<D>::has_process() {
+            self.budget.shift(by);
+        }
     }
 
     fn forget_transfer(&mut self) {
         self.server.reset();
-        (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
+        (self.reply_due, self.block_due) = (Tick::NEVER, Tick::NEVER);
     }
 
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
-    pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
+    pub(super) fn context<'a, Q: Transmit>(&self, now: Tick, out: &'a mut Q) -> Context<'a, Q> {
         Context { now, out, is_open: !(D::Application::LSS && self.lss.is_switching()) }
     }
 
     /// The same for process data, which have a share of the bus.
     pub(super) fn process_context<'a, Q: Transmit>(
         &'a mut self,
-        now: Instant,
+        now: Tick,
         out: &'a mut Q,
     ) -> ProcessContext<'a, Q> {
         self.budget.begin(now, || out.has_waiting_pdo());
@@ -111,27 +124,16 @@ impl<D: Definition> Device<D> {
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        match self.request(frame) {
-            Some(request) => {
-                // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
-                // transfer.
-                let server = &mut self.services.server;
-                if server.takes_block() && server.take_segment(request, now) {
-                    return self.process_next();
-                }
-                self.take_request(request, now, out);
-            }
-            None => self.take_other_service(frame, now, out),
-        }
+        let now = self.tick(now);
+        self.take_service_frame(frame, now, out);
         self.services_next()
     }
 
     /// Sends the frames of the services that are due, and returns a waiting action.
     #[inline]
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if now >= self.inner.services_due {
-            self.send_services(now, out);
-        }
+        let now = self.tick(now);
+        self.send_due_services(now, out);
         self.services_next()
     }
 
@@ -144,10 +146,25 @@ impl<D: Definition> Device<D> {
         lss.into_iter().chain(sdo).chain(guarding).chain(self.inner.watches.ids())
     }
 
+    #[inline(never)]
+    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
+        match self.request(frame) {
+            Some(request) => {
+                // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
+                // transfer.
+                let server = &mut self.services.server;
+                if !(server.takes_block() && server.take_segment(request, now)) {
+                    self.take_request(request, now, out);
+                }
+            }
+            None => self.take_other_service(frame, now, out),
+        }
+    }
+
     /// Takes a request to the SDO server.
     #[inline(never)]
     #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn take_request(&mut self, request: &[u8; 8], now: Instant, out: &mut impl Transmit) {
+    fn take_request(&mut self, request: &[u8; 8], now: Tick, out: &mut impl Transmit) {
         if self.inner.state.has_services() {
             self.on_request(request, &mut self.services.context(now, out));
         }
@@ -156,7 +173,7 @@ impl<D: Definition> Device<D> {
 
     /// Takes a frame that is no request to the SDO server: LSS, or the heartbeat of another node.
     #[inline(never)]
-    pub(super) fn take_other_service(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn take_other_service(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         if D::Application::LSS && frame.id() == lss::REQUEST.get() {
             let context = &mut self.services.context(now, out);
             self.services.lss.take_frame(frame, context, &mut self.inner);
@@ -185,7 +202,7 @@ impl<D: Definition> Device<D> {
     }
 
     #[inline]
-    fn send_due_services(&mut self, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn send_due_services(&mut self, now: Tick, out: &mut impl Transmit) {
         if now >= self.inner.services_due {
             self.send_services(now, out);
         }
@@ -203,7 +220,7 @@ impl<D: Definition> Device<D> {
             return self.respond(context);
         }
         // A reply that still waits is obsolete: the client has sent its next request.
-        *reply_due = Instant::NEVER;
+        *reply_due = Tick::NEVER;
         if D::Application::BLOCK_UPLOAD && server.is_sending() {
             self.send_block(context);
         }
@@ -217,7 +234,7 @@ impl<D: Definition> Device<D> {
         let has_reply = server.send_block(&mut self.inner, context.now, |data| {
             context.room() > Inner::<D>::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
         });
-        let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Instant::NEVER };
+        let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Tick::NEVER };
         self.services.block_due = block_due;
         self.inner.serve_until(block_due);
         if has_reply {
@@ -231,7 +248,7 @@ impl<D: Definition> Device<D> {
         let inner = &mut self.inner;
         let id = inner.service(SDO_RESPONSE);
         if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
-            self.services.reply_due = Instant::NEVER;
+            self.services.reply_due = Tick::NEVER;
         } else {
             self.services.reply_due = context.now.plus(RETRY);
             inner.serve_until(self.services.reply_due);
@@ -262,7 +279,7 @@ impl<D: Definition> Device<D> {
     }
 
     #[inline(never)]
-    fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn send_services(&mut self, now: Tick, out: &mut impl Transmit) {
         if D::Application::LSS
             && let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner)
         {
@@ -305,9 +322,9 @@ impl<D: Definition> Device<D> {
         }
     }
 
-    fn next_service(&self) -> Instant {
+    fn next_service(&self) -> Tick {
         let (services, inner) = (&self.services, &self.inner);
-        let lss = if D::Application::LSS { services.lss.due() } else { Instant::NEVER };
+        let lss = if D::Application::LSS { services.lss.due() } else { Tick::NEVER };
         if inner.is_initialising() {
             return lss;
         }

@@ -12,7 +12,7 @@ use crate::emcy::Fault;
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::{Duration, Instant, Transmit};
+use crate::{Duration, Instant, Tick, Transmit};
 
 /// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -91,6 +91,7 @@ impl<D: Definition> Device<D> {
     /// Reports the end of the job: `result` goes to the clients that wait for it. If an equal request has followed the
     /// handover, the job is handed over again instead, and the clients wait for the second run.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
         if let Some(job) = self.inner.jobs.take_repeated() {
             self.inner.pending.ask_for(job);
             self.inner.services_due = STALE;
@@ -109,11 +110,10 @@ impl<D: Definition> Device<D> {
     #[must_use]
     pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
         let inner = &self.inner;
+        let due = inner.heartbeat.latest().min(inner.watches.due()).min(inner.guarding.due());
         matches!(inner.state, State::PreOperational | State::Stopped)
             && self.services.is_between_requests()
-            && now + span <= inner.heartbeat.latest()
-            && now + span <= inner.watches.due()
-            && now + span <= inner.guarding.due()
+            && now + span <= self.clock.instant(due)
     }
 }
 
@@ -211,7 +211,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Reports groups that could not be loaded, by EMCY.
-    pub(super) fn report_stored(&mut self, now: Instant) {
+    pub(super) fn report_stored(&mut self, now: Tick) {
         for group in Group::ALL {
             let (lost, older) = (self.lost.contains(group), self.older.contains(group));
             self.set_fault(Fault::StoredData(group), lost, now);

@@ -2,7 +2,7 @@
 
 use super::fastscan::{Fastscan, Step};
 use super::{BitRate, Bound, Identity, Part, Request, Response};
-use crate::{Duration, NodeId};
+use crate::{NodeId, Span};
 
 /// Node-ID and bit rate that take effect later: with the next reset communication, activation or start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,8 +37,8 @@ pub(crate) struct Switch {
 }
 
 impl Switch {
-    pub(crate) fn delay(self) -> Duration {
-        Duration::from_millis(self.delay.into())
+    pub(crate) fn delay(self) -> Span {
+        Span::from_millis(self.delay)
     }
 }
 

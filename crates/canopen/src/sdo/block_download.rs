@@ -2,7 +2,7 @@
 
 use super::objects::{BUFFER, Sink};
 use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects};
-use crate::Instant;
+use crate::Tick;
 
 /// A block download under way.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +96,7 @@ impl Receiver {
         end: BlockEnd,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
-        now: Instant,
+        now: Tick,
     ) -> Result<(), Abort> {
         if let Some(last) = &self.last {
             let data = last.get(..7 - usize::from(end.unused.min(7))).unwrap_or(last);

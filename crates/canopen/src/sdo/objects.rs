@@ -2,7 +2,7 @@
 //! a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
-use crate::Instant;
+use crate::Tick;
 use crate::copy::copy;
 
 /// Size of the buffer in bytes: the longest value, and the longest part of a stream. A multiple of a segment (7), and
@@ -41,7 +41,7 @@ pub(crate) trait Objects {
     /// How the entry accepts a download, or why it does not.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and applies its effect.
-    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
+    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Tick) -> Result<(), Abort>;
     /// Whether the response to the latest write has to wait for [`Server::release`](super::Server::release). Returns
     /// `true` once.
     fn take_deferred(&mut self) -> bool;
@@ -228,7 +228,7 @@ impl Sink {
         &mut self,
         buffer: &[u8; BUFFER],
         objects: &mut impl Objects,
-        now: Instant,
+        now: Tick,
     ) -> Result<(), Abort> {
         if self.announced.is_some_and(|size| size != self.len()) {
             return Err(Abort::TooShort);

@@ -2,7 +2,7 @@
 
 use super::objects::{BUFFER, Sink, Source};
 use super::{Abort, Objects, Segment};
-use crate::Instant;
+use crate::Tick;
 
 /// An upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ impl Download {
         segment: &Segment,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
-        now: Instant,
+        now: Tick,
     ) -> Result<(), Abort> {
         if segment.toggle != self.toggle {
             return Err(Abort::Toggle);

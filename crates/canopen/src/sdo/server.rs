@@ -7,14 +7,14 @@ use super::block_upload::Sender;
 use super::objects::BUFFER;
 use super::segmented::{Download, Upload};
 use super::{Abort, BlockSegment, BlockSize, Multiplexer, Objects, Response};
-use crate::{Duration, Instant};
+use crate::{Span, Tick};
 use core::marker::PhantomData;
 
 /// How long a client may be silent during a transfer. CiA 301 leaves the time to the device.
-const TIME_OUT: Duration = Duration::from_millis(1000);
+const TIME_OUT: Span = Span::from_millis(1000);
 /// How long a client may be silent within a block. Then the last segment was lost, and the server acknowledges the
 /// segments that have arrived.
-const BLOCK_PAUSE: Duration = Duration::from_millis(300);
+const BLOCK_PAUSE: Span = Span::from_millis(300);
 
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct Server<O> {
     /// For an upload, a copy of the value; for a download, the data received so far.
     buffer: [u8; BUFFER],
     /// The time of the last progress.
-    active: Instant,
+    active: Tick,
     /// The last request that can be part of a series, and whether `reply` answers this request.
     previous: [u8; 8],
     is_answered: bool,
@@ -53,12 +53,17 @@ impl<O: Objects> Server<O> {
             transfer: Transfer::Idle,
             multiplexer: Multiplexer { index: 0, sub: 0 },
             buffer: [0; BUFFER],
-            active: Instant(0),
+            active: Tick(0),
             previous: [0; 8],
             is_answered: false,
             reply: [0; 8],
             objects: PhantomData,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.active.shift(by);
     }
 
     /// The last response as a frame.
@@ -90,9 +95,9 @@ impl<O: Objects> Server<O> {
     /// The next deadline of [`expire`](Server::expire).
     // Not inlined: three callers.
     #[inline(never)]
-    pub(crate) fn deadline(&self) -> Instant {
+    pub(crate) fn deadline(&self) -> Tick {
         match &self.transfer {
-            Transfer::Idle => Instant::NEVER,
+            Transfer::Idle => Tick::NEVER,
             _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
             _ => self.active.plus(TIME_OUT),
         }
@@ -108,7 +113,7 @@ impl<O: Objects> Server<O> {
     /// Takes a frame that is a segment within a block and only has to be copied to the buffer. Returns whether the
     /// frame was taken; if not, [`answer`](Server::answer) takes it. The deadline does not become earlier.
     #[inline]
-    pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Instant) -> bool {
+    pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Tick) -> bool {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return false };
         let is_taken = receiver.take_next(frame, &mut self.buffer);
         if is_taken {
@@ -121,7 +126,7 @@ impl<O: Objects> Server<O> {
     // Requests that begin a download or an upload are the most frequent ones. They are not part of a series, so they
     // are neither compared with the request before nor remembered.
     #[inline]
-    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let command = frame[0] >> 5;
         if !matches!(command, 1 | 2) || self.expects_block_segments() {
             self.answer_in_series(frame, objects, now)
@@ -134,7 +139,7 @@ impl<O: Objects> Server<O> {
 
     /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
-    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
@@ -182,7 +187,7 @@ impl<O: Objects> Server<O> {
     }
 
     /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
-    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Instant) -> bool {
+    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
         if answer == Ok(true) && objects.take_deferred() {
             self.transfer = Transfer::Deferred;
             return self.settle(Ok(false), now);
@@ -192,7 +197,7 @@ impl<O: Objects> Server<O> {
 
     /// Reports the end of a write whose reply was held back. Returns whether there is a reply and its client still
     /// waits.
-    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> bool {
+    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Tick) -> bool {
         if !matches!(self.transfer, Transfer::Deferred) {
             return false;
         }
@@ -202,7 +207,7 @@ impl<O: Objects> Server<O> {
 
     /// Handles a time-out: acknowledges a block whose last segment was lost, or aborts the transfer. Returns whether
     /// there is a reply.
-    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+    pub(crate) fn expire(&mut self, now: Tick) -> bool {
         if now < self.deadline() {
             return false;
         }
@@ -219,7 +224,7 @@ impl<O: Objects> Server<O> {
 
     /// Converts the answer to whether there is a reply. An error ends the transfer.
     #[inline]
-    fn settle(&mut self, answer: Answer, now: Instant) -> bool {
+    fn settle(&mut self, answer: Answer, now: Tick) -> bool {
         self.active = now;
         answer.unwrap_or_else(|abort| self.give_up(abort))
     }
@@ -243,7 +248,7 @@ impl<O: Objects> Server<O> {
     pub(crate) fn send_block(
         &mut self,
         objects: &mut O,
-        now: Instant,
+        now: Tick,
         send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {
         let Transfer::BlockUpload(sender) = &mut self.transfer else { return false };

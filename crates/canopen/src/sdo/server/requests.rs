@@ -1,7 +1,7 @@
 //! The reaction of the server to each request.
 
 use super::{Answer, Server, Transfer};
-use crate::Instant;
+use crate::Tick;
 use crate::sdo::block_download::Receiver;
 use crate::sdo::block_upload::Sender;
 use crate::sdo::objects::{Sink, Source};
@@ -19,7 +19,7 @@ impl<O: Objects> Server<O> {
         frame: &[u8; 8],
         is_repeated: bool,
         objects: &mut O,
-        now: Instant,
+        now: Tick,
     ) -> Answer {
         let Some(request) = Request::parse(frame) else {
             // Without a transfer, the abort message names the object of this frame instead of the last transfer's
@@ -72,7 +72,7 @@ impl<O: Objects> Server<O> {
 
     /// Takes the request that begins a download.
     #[inline(never)]
-    pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let at = Multiplexer::parse(frame);
         self.begin(at);
         // Most downloads are expedited: their data is used directly from the frame.
@@ -86,7 +86,7 @@ impl<O: Objects> Server<O> {
 
     /// Takes the request that begins an upload.
     #[inline(never)]
-    pub(super) fn initiate_upload(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    pub(super) fn initiate_upload(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let answer = self.upload(Multiplexer::parse(frame), objects);
         self.settle(answer, now)
     }
@@ -124,7 +124,7 @@ impl<O: Objects> Server<O> {
         at: Multiplexer,
         frame: &[u8; 8],
         objects: &mut O,
-        now: Instant,
+        now: Tick,
     ) -> Result<(), Abort> {
         let value = match Initiate::parse(frame) {
             Initiate::Expedited(bytes) => bytes,
@@ -137,7 +137,7 @@ impl<O: Objects> Server<O> {
         objects.write(at, value.as_slice(), now)
     }
 
-    fn download_segment(&mut self, segment: &Segment, objects: &mut O, now: Instant) -> Answer {
+    fn download_segment(&mut self, segment: &Segment, objects: &mut O, now: Tick) -> Answer {
         let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
         download.take(segment, &mut self.buffer, objects, now)?;
         if segment.last {
@@ -162,7 +162,7 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
-    fn block_download_end(&mut self, end: BlockEnd, objects: &mut O, now: Instant) -> Answer {
+    fn block_download_end(&mut self, end: BlockEnd, objects: &mut O, now: Tick) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
