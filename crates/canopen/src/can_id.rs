@@ -72,6 +72,7 @@ impl CobId {
     /// `None` for an extended frame (bit 29) or a CAN-ID of more than 11 bits: this node uses base frames only.
     #[must_use]
     #[allow(clippy::cast_possible_truncation)] // 11 bits.
+    #[inline(never)]
     pub const fn parse(value: u32) -> Option<CobId> {
         let id = value & 0x3FFF_FFFF;
         if id > 0x7FF {

@@ -97,6 +97,7 @@ impl Tick {
     }
 
     /// The epoch has moved by a span. A tick before the new epoch becomes 0: it is long past.
+    #[inline(never)]
     pub(crate) fn shift(&mut self, by: Span) {
         if *self != Tick::NEVER {
             self.0 = self.0.saturating_sub(by.0);
@@ -123,16 +124,19 @@ impl Clock {
     /// The tick of the present, if the epoch needs not move for it.
     #[inline]
     pub(crate) fn tick(&self, now: Instant) -> Option<Tick> {
-        let since = now.0.saturating_sub(self.epoch);
+        let since = now.0.wrapping_sub(self.epoch);
         u32::try_from(since).ok().filter(|since| *since < Clock::LATEST).map(Tick)
     }
 
     /// Moves the epoch towards the present. Returns the tick of the present, and the span by which all ticks of the
     /// device shift.
+    ///
+    /// An instant before the epoch is that of a caller whose time went back: the epoch stays.
     pub(crate) fn follow(&mut self, now: Instant) -> (Tick, Span) {
-        let epoch = now.0.saturating_sub(Clock::PAST.into());
-        let by = epoch.saturating_sub(self.epoch);
-        self.epoch = epoch;
+        let Some(by) = now.0.saturating_sub(Clock::PAST.into()).checked_sub(self.epoch) else {
+            return (Tick(0), Span(0));
+        };
+        self.epoch += by;
         (Tick(Clock::PAST), Span(u32::try_from(by).unwrap_or(u32::MAX)))
     }
 

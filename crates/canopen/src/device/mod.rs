@@ -98,7 +98,8 @@ impl<D: Definition> Device<D> {
     }
 
     /// The present inside the device.
-    #[inline]
+    // Not inlined: every call of the device begins with it.
+    #[inline(never)]
     fn tick(&mut self, now: Instant) -> Tick {
         self.clock.tick(now).unwrap_or_else(|| self.follow(now))
     }

@@ -2,6 +2,7 @@
 
 use super::Definition;
 use super::inner::Inner;
+use super::rpdos::filter_bit;
 use super::{Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::nmt::Command;
@@ -16,20 +17,21 @@ impl<D: Definition> Device<D> {
         let now = self.tick(now);
         if self.is_request(frame) {
             self.send_due_process(now, out);
+            self.take_service_frame(frame, now, out);
         } else {
             self.take_process_frame(frame, now, out);
+            self.take_other_service(frame, now, out);
         }
-        self.take_service_frame(frame, now, out);
-        self.services_next()
+        self.next()
     }
 
     /// Sends all frames that are due, in both halves.
-    #[inline]
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let now = self.tick(now);
         self.send_due_process(now, out);
         self.send_due_services(now, out);
-        self.services_next()
+        self.next()
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
@@ -43,18 +45,21 @@ impl<D: Definition> Device<D> {
 
     #[inline(never)]
     fn take_process_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
-        let is_nmt = frame.id() == CanId::NMT.get();
-        if is_nmt {
+        if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame);
+        } else if Inner::<D>::has_process() && self.inner.is_of_process(frame) {
+            return self.take_process_data(frame, now, out);
         }
-        if !Inner::<D>::has_process() {
-            return;
-        }
+        self.send_due_process(now, out);
+    }
+
+    #[inline(never)]
+    fn take_process_data(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         if D::SERVICES.contains(Services::TIME) && self.inner.on_time(frame) {
             return;
         }
         let context = &mut self.services.process_context(now, out);
-        if !is_nmt && self.inner.state.has_pdos() {
+        if self.inner.state.has_pdos() {
             self.inner.take_pdo_frame(frame, context);
         }
         self.inner.send_process(context);
@@ -159,7 +164,16 @@ impl<D: Definition> Device<D> {
 }
 
 impl<D: Definition> Inner<D> {
-    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
+    /// Whether a frame may be a SYNC, a PDO or a time stamp for this device. Most frames of other nodes are not.
+    #[inline]
+    fn is_of_process(&self, frame: &Frame) -> bool {
+        self.rpdo_filter & filter_bit(frame.id()) != 0
+            || frame.is_remote()
+            || Self::has(Services::SYNC) && self.sync.id().get() == frame.id()
+            || Self::has(Services::TIME)
+    }
+
+    fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         if Self::has(Services::SYNC) && self.sync.accepts(frame) {
             self.on_sync(frame, context);
         } else if frame.is_remote() {

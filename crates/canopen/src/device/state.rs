@@ -146,7 +146,7 @@ impl<D: Definition> Device<D> {
             self.inner.enter(State::PreOperational);
         }
         self.send_due_services(now, out);
-        self.services_next()
+        self.next()
     }
 
     /// Loads the values with which [`start`](Device::start) will begin, for parameters that are needed before the bus
@@ -204,6 +204,12 @@ impl<D: Definition> Device<D> {
     }
 
     /// Result of a call for services, with one waiting action.
+    #[inline(never)]
+    pub(super) fn next(&mut self) -> Next {
+        self.services_next()
+    }
+
+    /// As [`next`](Device::next), for a caller that ignores a part of the result.
     #[inline]
     pub(super) fn services_next(&mut self) -> Next {
         let inner = &mut self.inner;
