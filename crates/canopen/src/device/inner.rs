@@ -7,14 +7,10 @@ use super::{Action, Application, Definition, STALE, store};
 use crate::array::Array;
 use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
 use crate::emcy::Fault;
-use crate::lss::Identity;
 use crate::nmt::State;
 use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
 use crate::transmit::Context;
 use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_stamp};
-
-/// Identity object.
-const IDENTITY: u16 = 0x1018;
 
 /// A device without its SDO server and its LSS slave, which act on it.
 pub(super) struct Inner<D: Definition> {
@@ -173,15 +169,6 @@ impl<D: Definition> Inner<D> {
 
     pub(super) fn word(&self, field: Field) -> u32 {
         little_endian(field.get(self.image.as_ref()))
-    }
-
-    pub(super) fn identity(&self) -> Identity {
-        Identity {
-            vendor: self.number(IDENTITY, 1),
-            product: self.number(IDENTITY, 2),
-            revision: self.number(IDENTITY, 3),
-            serial: self.number(IDENTITY, 4),
-        }
     }
 
     /// Changes the NMT state.

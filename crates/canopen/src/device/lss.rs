@@ -2,9 +2,12 @@
 
 use super::inner::Inner;
 use super::{Action, Definition, STALE};
-use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
+use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Slave, Switch, frame_of_word};
 use crate::transmit::{Context, RETRY};
 use crate::{Frame, NodeId, Span, Tick, Transmit};
+
+/// Identity object: its sub-indexes 1 to 4 are the parts of the identity.
+const IDENTITY: u16 = 0x1018;
 
 /// A change of the bit rate (CiA 305, activate bit timing parameters).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,11 +78,11 @@ impl LssSlave {
         context: &mut Context<'_, impl Transmit>,
         inner: &mut Inner<impl Definition>,
     ) {
-        let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
-        let identity = inner.identity();
-        let response = match self.slave.take(request, &identity, inner.node_id) {
+        let Some(request) = frame.full(REQUEST).copied() else { return };
+        let identity = |part| inner.number(IDENTITY, part + 1);
+        let response = match self.slave.take(request, identity, inner.node_id) {
             Outcome::Silence => None,
-            Outcome::Answer(response) => Some(response),
+            Outcome::Answer(command, value) => Some((command, value)),
             Outcome::BootUp => {
                 inner.request_boot_up();
                 None
@@ -99,9 +102,9 @@ impl LssSlave {
         inner.services_due = STALE;
     }
 
-    /// Sends a response. It replaces a response that still waits: the master no longer expects the older one.
-    pub(super) fn respond(&mut self, response: Response, context: &mut Context<'_, impl Transmit>) {
-        self.reply = response.encode();
+    /// Sends a response, given as command specifier and value. It replaces a response that still waits: the master no longer expects the older one.
+    pub(super) fn respond(&mut self, (command, value): (u8, u32), context: &mut Context<'_, impl Transmit>) {
+        self.reply = frame_of_word(command, value);
         self.send(context);
     }
 

@@ -47,6 +47,9 @@ impl Multiplexer {
     }
 }
 
+/// The bit of the command byte that alternates from segment to segment.
+const TOGGLE: u8 = 0x10;
+
 /// One segment of a segmented transfer, the same in both directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
@@ -62,7 +65,7 @@ impl Segment {
     fn parse(frame: &[u8; 8]) -> Segment {
         let [command, data @ ..] = frame;
         let unused = command >> 1 & 7;
-        Segment { toggle: command & 0x10 != 0, last: command & 1 != 0, data: Bytes::new(*data, 7 - unused) }
+        Segment { toggle: command & TOGGLE != 0, last: command & 1 != 0, data: Bytes::new(*data, 7 - unused) }
     }
 
     fn encode(self, command: u8) -> [u8; 8] {

@@ -1,7 +1,7 @@
 //! The interface of the server to the objects, and the two ends of a transfer: the source of an upload and the sink of
 //! a download.
 
-use super::{Abort, Bytes, Multiplexer, crc};
+use super::{Abort, Multiplexer, crc};
 use crate::Tick;
 use crate::copy::copy;
 
@@ -83,17 +83,6 @@ impl Source {
     ) -> Result<&'a [u8], Abort> {
         let content = if self.len <= BUFFER { buffer } else { objects.read(self.at)? };
         content.get(..self.len).ok_or(Abort::General)
-    }
-
-    /// The next bytes from `offset` on, at most seven.
-    pub(super) fn piece(
-        &self,
-        offset: usize,
-        buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Result<Bytes<7>, Abort> {
-        let content = self.content(buffer, objects)?;
-        Ok(Bytes::from_slice(content.get(offset..).unwrap_or(&[])))
     }
 }
 

@@ -1,8 +1,9 @@
 //! Segmented transfers (CiA 301, 7.2.4.3.4 and 7.2.4.3.7).
 
 use super::objects::{BUFFER, Sink, Source};
-use super::{Abort, Objects, Segment};
+use super::{Abort, Objects, TOGGLE};
 use crate::Tick;
+use crate::copy::copy;
 
 /// An upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -17,21 +18,38 @@ impl Upload {
         Upload { source, sent: 0, toggle: false }
     }
 
-    /// The next segment. The transfer is over after a segment with `last`.
+    /// The frame of the next segment, and whether it is the last one.
     pub(super) fn next(
         &mut self,
         requested: bool,
         buffer: &[u8; BUFFER],
         objects: &mut impl Objects,
-    ) -> Result<Segment, Abort> {
+    ) -> Result<([u8; 8], bool), Abort> {
         if requested != self.toggle {
             return Err(Abort::Toggle);
         }
-        let data = self.source.piece(self.sent, buffer, objects)?;
-        self.sent += usize::from(data.len());
+        let content = self.source.content(buffer, objects)?.get(self.sent..).unwrap_or(&[]);
         self.toggle = !requested;
-        Ok(Segment { toggle: requested, last: self.sent == self.source.len(), data })
+        let toggle = if requested { TOGGLE } else { 0 };
+        let mut frame = [0; 8];
+        let [command, data @ ..] = &mut frame;
+        if let Some((full, _)) = content.split_first_chunk().filter(|(_, rest)| !rest.is_empty()) {
+            *data = *full;
+            *command = toggle;
+            self.sent += data.len();
+            return Ok((frame, false));
+        }
+        let len = content.len().min(7);
+        copy(data, content);
+        *command = toggle | in_segment(7 - len) << 1 | 1;
+        Ok((frame, true))
     }
+}
+
+/// Converts a number of bytes of a segment.
+#[allow(clippy::cast_possible_truncation)] // A segment has seven bytes.
+const fn in_segment(bytes: usize) -> u8 {
+    bytes as u8
 }
 
 /// A download under way.
@@ -46,23 +64,27 @@ impl Download {
         Download { sink, toggle: false }
     }
 
-    /// Takes a segment. The transfer is over after a segment with `last`.
+    /// Takes the frame of a segment. Returns whether the transfer is over.
     pub(super) fn take(
         &mut self,
-        segment: &Segment,
+        frame: &[u8; 8],
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
         now: Tick,
-    ) -> Result<(), Abort> {
-        if segment.toggle != self.toggle {
+    ) -> Result<bool, Abort> {
+        let [command, data @ ..] = frame;
+        if (command & TOGGLE != 0) != self.toggle {
             return Err(Abort::Toggle);
         }
         self.toggle = !self.toggle;
-        self.sink.append(segment.data.as_slice(), buffer, objects)?;
-        if segment.last {
-            self.sink.complete(buffer, objects, now)
+        let unused = usize::from(command >> 1 & 7);
+        self.sink.append(data.get(..data.len() - unused).unwrap_or(data), buffer, objects)?;
+        let is_last = command & 1 != 0;
+        if is_last {
+            self.sink.complete(buffer, objects, now)?;
         } else {
-            self.sink.hand_over(buffer, objects)
+            self.sink.hand_over(buffer, objects)?;
         }
+        Ok(is_last)
     }
 }

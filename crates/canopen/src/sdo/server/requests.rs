@@ -7,8 +7,8 @@ use crate::sdo::block_upload::Sender;
 use crate::sdo::objects::{Sink, Source};
 use crate::sdo::segmented::{Download, Upload};
 use crate::sdo::{
-    Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Objects, Request, Response,
-    Segment, Writable,
+    Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE,
+    Writable, tail,
 };
 
 impl<O: Objects> Server<O> {
@@ -21,53 +21,71 @@ impl<O: Objects> Server<O> {
         objects: &mut O,
         now: Tick,
     ) -> Answer {
-        let Some(request) = Request::parse(frame) else {
-            // Without a transfer, the abort message names the object of this frame instead of the last transfer's
-            // object.
-            if self.is_idle() {
-                self.multiplexer = Multiplexer::parse(frame);
-            }
-            return Err(Abort::Command);
-        };
-        match request {
-            // `answer` handles these two.
-            Request::Upload(_) | Request::Download(..) => Err(Abort::Command),
-            Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
-            Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
-            Request::Abort(..) => {
+        let command = frame[0];
+        match command >> 5 {
+            0 => self.download_segment(frame, objects, now),
+            3 => self.upload_segment(command & TOGGLE != 0, objects),
+            4 => {
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
-            Request::BlockDownload { at, .. } if !O::BLOCK_DOWNLOAD => {
-                self.begin(at);
-                Err(Abort::Command)
-            }
-            Request::BlockDownloadEnd(_) if !O::BLOCK_DOWNLOAD => Err(Abort::Command),
-            Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
-            Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
-            Request::BlockUpload { at, .. } if !O::BLOCK_UPLOAD => {
-                self.begin(at);
-                Err(Abort::Command)
-            }
-            _ if !O::BLOCK_UPLOAD => Err(Abort::Command),
-            Request::BlockUpload { at, block_size, threshold, .. } => {
-                self.block_upload(at, block_size, threshold, objects)
-            }
-            Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| false),
-            Request::BlockAcknowledge { sequence, block_size } => {
-                match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
-                    Some(end) => Ok(self.set_reply(Response::BlockUploadEnd(end))),
-                    None => Ok(false),
+            5 => self.block_upload_request(frame, is_repeated, objects),
+            6 => self.block_download_request(frame, objects, now),
+            // `answer` handles 1 and 2.
+            _ => {
+                // Without a transfer, the abort message names the object of this frame instead of the last transfer's
+                // object.
+                if self.is_idle() {
+                    self.multiplexer = Multiplexer::parse(frame);
                 }
+                Err(Abort::Command)
             }
+        }
+    }
+
+    /// Takes a request of a block download that is not a segment.
+    fn block_download_request(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
+        let [command, ..] = *frame;
+        let is_end = command & 1 != 0;
+        if !O::BLOCK_DOWNLOAD {
+            return self.refuse_block(is_end, frame);
+        }
+        if is_end {
+            return self.block_download_end(BlockEnd::parse(frame), objects, now);
+        }
+        let size = (command & 2 != 0).then(|| u32::from_le_bytes(tail(frame)));
+        self.block_download(Multiplexer::parse(frame), command & 4 != 0, size, objects)
+    }
+
+    /// Takes a request of a block upload.
+    fn block_upload_request(&mut self, frame: &[u8; 8], is_repeated: bool, objects: &mut O) -> Answer {
+        let [command, sequence, block_size, ..] = *frame;
+        if !O::BLOCK_UPLOAD {
+            return self.refuse_block(command & 3 != 0, frame);
+        }
+        match command & 3 {
+            0 => self.block_upload(Multiplexer::parse(frame), frame[4], frame[5], objects),
             // A confirmation has no answer, so a repetition is ignored. A refused confirmation is refused again.
-            Request::BlockUploadEnded if is_repeated && !self.is_answered => Ok(false),
-            Request::BlockUploadEnded => {
+            1 if is_repeated && !self.is_answered => Ok(false),
+            1 => {
                 self.sender()?.ended()?;
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
+            2 => match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
+                Some(end) => Ok(self.set_reply(Response::BlockUploadEnd(end))),
+                None => Ok(false),
+            },
+            _ => self.sender()?.start(is_repeated).map(|()| false),
         }
+    }
+
+    /// Refuses a request of a block transfer. A request that is not a part of one begins a transfer.
+    fn refuse_block(&mut self, is_part: bool, frame: &[u8; 8]) -> Answer {
+        if !is_part {
+            self.begin(Multiplexer::parse(frame));
+        }
+        Err(Abort::Command)
     }
 
     /// Takes the request that begins a download.
@@ -111,11 +129,12 @@ impl<O: Objects> Server<O> {
 
     fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
-        let segment = upload.next(toggle, &self.buffer, objects)?;
-        if segment.last {
+        let is_last;
+        (self.reply, is_last) = upload.next(toggle, &self.buffer, objects)?;
+        if is_last {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.set_reply(Response::UploadedSegment(segment)))
+        Ok(true)
     }
 
     #[inline(never)]
@@ -137,13 +156,12 @@ impl<O: Objects> Server<O> {
         objects.write(at, value.as_slice(), now)
     }
 
-    fn download_segment(&mut self, segment: &Segment, objects: &mut O, now: Tick) -> Answer {
+    fn download_segment(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
         let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
-        download.take(segment, &mut self.buffer, objects, now)?;
-        if segment.last {
+        if download.take(frame, &mut self.buffer, objects, now)? {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.set_reply(Response::DownloadedSegment { toggle: segment.toggle }))
+        Ok(self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 }))
     }
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
