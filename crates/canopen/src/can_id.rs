@@ -38,9 +38,10 @@ impl CanId {
         (id ^ self.0) & Self::FUNCTION == 0 && id & 0x7F != 0
     }
 
-    /// The identifiers with the function code of this one, for the node-IDs 1 to 127.
-    pub(crate) fn of_all_nodes(self) -> impl Iterator<Item = CanId> {
-        (1..=0x7F).map(move |node| CanId::of_service(self.0, node))
+    /// The identifier with the function code of this one for a node-ID; `None` beyond 127.
+    pub(crate) fn of_node(self, node: usize) -> Option<CanId> {
+        let node = u8::try_from(node).ok().and_then(crate::NodeId::new)?;
+        Some(CanId::of_service(self.0, node.get()))
     }
 
     /// One of the two identifiers of LSS (CiA 305): 0 for the responses, 1 for the requests.

@@ -13,42 +13,44 @@ use crate::transmit::Context;
 use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_stamp};
 
 /// A device without its SDO server and its LSS slave, which act on it.
+// In this order, a short instruction reaches most fields: bytes and words come first, arrays last.
+#[repr(C)]
 pub(super) struct Inner<D: Definition> {
-    pub(super) dictionary: &'static Dictionary,
+    pub(super) state: State,
     /// `None` for a device that waits for a node-ID from LSS.
     pub(super) node_id: Option<NodeId>,
-    pub(super) state: State,
-    /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
-    pub(super) process_due: Tick,
-    pub(super) services_due: Tick,
-    pub(super) heartbeat: heartbeat::Producer,
-    pub(super) guarding: heartbeat::Guarding,
-    pub(super) pending: Pending,
-    pub(super) application: D::Application,
-    pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
-    pub(super) sync: sync::Consumer,
-    pub(super) sync_producer: sync::Producer,
-    pub(super) time_stamp: time_stamp::Service,
-    pub(super) emcy: emcy::Producer,
-    pub(super) tpdos: D::Tpdos,
-    pub(super) rpdos: D::Rpdos,
-    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
-    /// in the set and need no further check.
-    pub(super) rpdo_filter: u32,
-    pub(super) scanner: Scanner<D::Scanned>,
-    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
-    pub(super) all_nodes: Option<(CanId, u16)>,
+    pub(super) is_bus_off: bool,
     /// Whether any TPDO sends events.
     pub(super) sends_events: bool,
-    /// The first PDOs of the chains.
-    pub(super) first_tpdos: Links,
-    pub(super) first_rpdos: Links,
-    pub(super) jobs: store::Jobs,
     /// The groups whose stored values could not be loaded: the defaults are in use.
     pub(super) lost: Groups,
     /// The groups whose newest stored values could not be loaded: the values of the save before are in use.
     pub(super) older: Groups,
-    pub(super) is_bus_off: bool,
+    pub(super) pending: Pending,
+    pub(super) jobs: store::Jobs,
+    pub(super) dictionary: &'static Dictionary,
+    /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
+    pub(super) process_due: Tick,
+    pub(super) services_due: Tick,
+    /// The first PDOs of the chains.
+    pub(super) first_tpdos: Links,
+    pub(super) first_rpdos: Links,
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
+    /// in the set and need no further check.
+    pub(super) rpdo_filter: u32,
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
+    pub(super) all_nodes: Option<(CanId, u16)>,
+    pub(super) heartbeat: heartbeat::Producer,
+    pub(super) sync: sync::Consumer,
+    pub(super) sync_producer: sync::Producer,
+    pub(super) time_stamp: time_stamp::Service,
+    pub(super) guarding: heartbeat::Guarding,
+    pub(super) emcy: emcy::Producer,
+    pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
+    pub(super) application: D::Application,
+    pub(super) tpdos: D::Tpdos,
+    pub(super) rpdos: D::Rpdos,
+    pub(super) scanner: Scanner<D::Scanned>,
     pub(super) image: D::Image,
 }
 

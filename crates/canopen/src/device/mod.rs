@@ -46,9 +46,9 @@ use services::Services;
 /// do not work.
 #[repr(C)] // The services are short. At the start of the structure, an instruction reaches their fields directly.
 pub struct Device<D: Definition> {
+    clock: Clock,
     services: Services<D>,
     inner: Inner<D>,
-    clock: Clock,
 }
 
 impl<D: Definition> core::fmt::Debug for Device<D> {
@@ -98,9 +98,15 @@ impl<D: Definition> Device<D> {
     }
 
     /// The present inside the device.
-    // Not inlined: every call of the device begins with it.
+    // Not inlined: many callers.
     #[inline(never)]
     fn tick(&mut self, now: Instant) -> Tick {
+        self.tick_of_frame(now)
+    }
+
+    /// As [`tick`](Device::tick), for the calls that hand over a frame.
+    #[inline]
+    fn tick_of_frame(&mut self, now: Instant) -> Tick {
         self.clock.tick(now).unwrap_or_else(|| self.follow(now))
     }
 

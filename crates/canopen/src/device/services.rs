@@ -17,8 +17,8 @@ const SDO_REQUEST: u16 = 0x600;
 pub(super) const ERROR_CONTROL: u16 = 0x700;
 
 /// The SDO server and the LSS slave of a device, with the responses that wait for room in the queue.
+#[repr(C)] // As for `Inner`.
 pub(super) struct Services<D: Definition> {
-    server: Server<Inner<D>>,
     /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is not a
     /// request.
     sdo_request: FullFrameId,
@@ -29,6 +29,7 @@ pub(super) struct Services<D: Definition> {
     lss: LssSlave,
     /// The share of process data in the bus.
     budget: Budget,
+    server: Server<Inner<D>>,
 }
 
 impl<D: Definition> Services<D> {
@@ -124,7 +125,7 @@ impl<D: Definition> Device<D> {
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        let now = self.tick(now);
+        let now = self.tick_of_frame(now);
         self.take_service_frame(frame, now, out);
         self.services_next()
     }
@@ -143,10 +144,10 @@ impl<D: Definition> Device<D> {
         let lss = D::Application::LSS.then_some(lss::REQUEST);
         let own = self.inner.node_id.filter(|_| Inner::<D>::has(Has::GUARDING));
         let guarding = own.map(|own| own.service(ERROR_CONTROL));
-        lss.into_iter().chain(sdo).chain(guarding).chain(self.inner.watches.ids())
+        [lss, sdo, guarding].into_iter().flatten().chain(self.inner.watches.ids())
     }
 
-    #[inline(never)]
+    #[inline]
     pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         match self.request(frame) {
             Some(request) => {

@@ -137,6 +137,11 @@ impl Tpdo {
         self.is_valid.then_some(&self.settings)
     }
 
+    /// The CAN-ID of a valid TPDO that answers remote frames.
+    pub(crate) fn requested(&self) -> Option<CanId> {
+        self.settings().filter(|settings| settings.answers_remote).map(|settings| settings.id)
+    }
+
     /// Whether a transmission waits.
     pub(crate) fn is_pending(&self) -> bool {
         self.pending
@@ -253,9 +258,6 @@ impl Tpdo {
     #[inline(never)]
     pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let settings = &self.settings;
-        if !settings.answers_remote {
-            return;
-        }
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // In a full queue the sample is dropped: the client repeats its request.
