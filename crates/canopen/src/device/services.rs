@@ -126,6 +126,9 @@ impl<D: Definition> Device<D> {
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         let now = self.tick_of_frame(now);
+        if self.take_segment(frame, now) {
+            return self.process_next();
+        }
         self.take_service_frame(frame, now, out);
         self.services_next()
     }
@@ -147,26 +150,18 @@ impl<D: Definition> Device<D> {
         [lss, sdo, guarding].into_iter().flatten().chain(self.inner.watches.ids())
     }
 
+    /// Takes a segment of a block that only needs a place in the buffer. In any state: without SDO, there is no transfer.
+    /// Returns whether the frame was one.
     #[inline]
-    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
-        match self.request(frame) {
-            Some(request) => {
-                // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
-                // transfer.
-                let server = &mut self.services.server;
-                if !(server.takes_block() && server.take_segment(request, now)) {
-                    self.take_request(request, now, out);
-                }
-            }
-            None => self.take_other_service(frame, now, out),
-        }
+    fn take_segment(&mut self, frame: &Frame, now: Tick) -> bool {
+        let request = if self.services.server.takes_block() { self.request(frame) } else { None };
+        request.is_some_and(|request| self.services.server.take_segment(request, now))
     }
 
-    /// Takes a request to the SDO server.
     #[inline(never)]
-    #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn take_request(&mut self, request: &[u8; 8], now: Tick, out: &mut impl Transmit) {
-        if self.inner.state.has_services() {
+    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
+        let Some(request) = self.request(frame) else { return self.take_other_service(frame, now, out) };
+        if self.inner.state.has_services() && !self.take_segment(frame, now) {
             self.on_request(request, &mut self.services.context(now, out));
         }
         self.send_due_services(now, out);
