@@ -1,5 +1,7 @@
 //! CAN-IDs, and COB-IDs as the dictionary stores them.
 
+use crate::sdo::Abort;
+
 /// An 11-bit CAN-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -78,6 +80,27 @@ impl CobId {
             return None;
         }
         Some(CobId { id: CanId(id as u16), bit31: value & 1 << 31 != 0, bit30: value & 1 << 30 != 0 })
+    }
+
+    /// Checks a new value of a COB-ID that bit 31 disables (EMCY, SDO): the CAN-ID of an enabled service does not
+    /// change, and must not be restricted.
+    pub(crate) fn check_change(old: u32, new: u32) -> Result<(), Abort> {
+        let id = CobId::check_place(old, new)?;
+        if id.is_some_and(CanId::is_restricted) { Err(Abort::InvalidValue) } else { Ok(()) }
+    }
+
+    /// As [`check_change`](CobId::check_change), for a service that can use a restricted CAN-ID. Returns the CAN-ID of an
+    /// enabled service.
+    pub(crate) fn check_place(old: u32, new: u32) -> Result<Option<CanId>, Abort> {
+        let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
+        let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
+        let moves = !old.bit31 && !new.bit31 && old.id != new.id;
+        if moves { Err(Abort::InvalidValue) } else { Ok((!new.bit31).then_some(new.id)) }
+    }
+
+    /// The CAN-ID of an enabled service of base frames: bits 29 to 31 are 0.
+    pub(crate) fn enabled(value: u32) -> Option<CanId> {
+        CobId::parse(value).filter(|cob_id| !cob_id.bit31 && !cob_id.bit30).map(|cob_id| cob_id.id)
     }
 
     /// The value as the dictionary stores it.

@@ -3,7 +3,7 @@
 use super::{Soundness, Stored};
 use crate::NodeId;
 use crate::dictionary::{Entry, Group, Groups};
-use crate::emcy::{Condition, ErrorClass, Fault};
+use crate::emcy::{Condition, ErrorClass, Fault, Message};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Part};
 use crate::time_stamp::TimeOfDay;
@@ -99,6 +99,9 @@ pub trait Application {
     /// A node whose heartbeat is monitored (1016h) is in another state than before, or boots up
     /// ([`State::Initialising`]). A heartbeat that is missing is a [`fault`](Application::fault).
     fn node_state(&mut self, _node: NodeId, _state: State, _image: &mut [u8]) {}
+
+    /// A node that is consumed (1028h) has sent an EMCY; code 0 when none of its faults is left.
+    fn emergency(&mut self, _node: NodeId, _message: Message, _image: &mut [u8]) {}
 
     /// A fault has occurred (`active`) or is over.
     fn fault(&mut self, _fault: Fault, _active: bool, _image: &mut [u8]) {}

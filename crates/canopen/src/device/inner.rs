@@ -17,7 +17,7 @@ use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync, time_stamp}
 const IDENTITY: u16 = 0x1018;
 
 /// A device without its SDO server and its LSS slave, which act on it.
-pub(super) struct Inner<D: Definition> {
+pub struct Inner<D: Definition> {
     pub(super) dictionary: &'static Dictionary,
     /// `None` for a device that waits for a node-ID from LSS.
     pub(super) node_id: Option<NodeId>,
@@ -57,10 +57,6 @@ pub(super) struct Inner<D: Definition> {
 }
 
 impl<D: Definition> Inner<D> {
-    /// Free places in the transmit queue that a block upload leaves: for a heartbeat and an LSS response, and beside
-    /// process data for all PDOs of a SYNC, a heartbeat and an EMCY.
-    pub(super) const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
-
     /// A device that has not started.
     pub(super) fn new(
         dictionary: &'static Dictionary,

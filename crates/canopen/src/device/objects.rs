@@ -8,11 +8,13 @@ use super::store::{check_program_control, command};
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
-use crate::{Instant, emcy, sync, time_stamp};
+use crate::{CobId, Instant, sync, time_stamp};
 
 impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
     const BLOCK_DOWNLOAD: bool = D::Application::BLOCK_DOWNLOAD;
+    /// For a heartbeat and an LSS response, and beside process data for all PDOs of a SYNC, a heartbeat and an EMCY.
+    const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
 
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
@@ -137,7 +139,16 @@ impl<D: Definition> Inner<D> {
             Rule::SyncOverflow if Self::has(Services::SYNC) => {
                 sync::check_overflow(value, self.number(0x1006, 0))
             }
-            Rule::EmcyCobId if Self::has(Services::EMCY) => emcy::check_cob_id(self.word(entry.field), value),
+            Rule::EmcyCobId if Self::has(Services::EMCY) => {
+                CobId::check_change(self.word(entry.field), value)
+            }
+            Rule::EmcyWatch if Self::has(Services::EMCY_CONSUMER) => {
+                CobId::check_change(self.word(entry.field), value)
+            }
+            Rule::SdoServerCobId if Self::has(Services::SDO_SERVERS) => {
+                CobId::check_change(self.word(entry.field), value)
+            }
+            Rule::SdoClientCobId if Self::has(Services::SDO_CLIENT) => self.check_client(entry, value),
             Rule::StartUp if Self::has(Services::SELF_START) => {
                 if matches!(value, 0 | SELF_START) {
                     Ok(())
@@ -222,6 +233,9 @@ impl<D: Definition> Inner<D> {
                 | Rule::PdoCobId
                 | Rule::PdoPredefined
                 | Rule::HeartbeatWatch
+                | Rule::EmcyWatch
+                | Rule::SdoServerCobId
+                | Rule::SdoClientCobId
         ) && Self::has(Services::FAULTS)
         {
             self.pending.identifiers_changed();

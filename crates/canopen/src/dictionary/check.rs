@@ -25,6 +25,9 @@ pub const fn check(rows: &[Object]) {
         let has_sub_0 = row.sub == 0 || (i > 0 && rows[i - 1].index == row.index);
         require(has_sub_0, row, "the object has no sub-index 0");
         check_row(row);
+        let is_more = row.index > 0x1201 && row.index < 0x1280;
+        let follows = !is_more || row.sub > 0 || (i > 0 && rows[i - 1].index + 1 == row.index);
+        require(follows, row, "further SDO servers begin at 1201h and have no gap");
         i += 1;
     }
     // The order of the rows is checked by now: they are found by a binary search.
@@ -54,6 +57,7 @@ const fn check_event_timer(rows: &[Object], row: &Object) {
 
 const fn check_row(row: &Object) {
     require(row.sub < u8::MAX, row, "an object has at most 255 entries, 0 to 254");
+    require(row.index != 0x1028 || row.sub <= 127, row, "the sub-index is a node-ID, 1 to 127");
     check_rule(row);
     check_limits(row);
     check_default(row);

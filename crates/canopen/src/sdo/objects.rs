@@ -22,7 +22,7 @@ pub enum Part<'a> {
 
 /// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Writable {
+pub enum Writable {
     /// The entry takes one value of at most this many bytes.
     Value(usize),
     /// The entry is a domain and takes its content in parts.
@@ -30,11 +30,13 @@ pub(crate) enum Writable {
 }
 
 /// The dictionary with its values and rules, as the server uses it.
-pub(crate) trait Objects {
+pub trait Objects {
     /// Whether block uploads are supported.
     const BLOCK_UPLOAD: bool;
     /// Whether block downloads are supported.
     const BLOCK_DOWNLOAD: bool;
+    /// Free places in the transmit queue that a block upload leaves.
+    const RESERVED_ROOM: usize;
 
     /// The value of an entry. The application may set it before.
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort>;

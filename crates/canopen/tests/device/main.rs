@@ -3,9 +3,11 @@
 mod application;
 mod bench;
 mod block;
+mod channels;
 mod dictionary;
 mod emcy;
 mod emcy_detail;
+mod emergencies;
 mod events;
 #[path = "../exchange/mod.rs"]
 mod exchange;
