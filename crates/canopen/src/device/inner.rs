@@ -201,6 +201,9 @@ impl<D: Definition> Inner<D> {
         if everything {
             self.load_stored(Group::Application);
             self.load_stored(Group::Calibration);
+            if Self::has(Services::OWN_GROUPS) {
+                Group::OWN.into_iter().for_each(|group| self.load_stored(group));
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use super::Definition;
 use super::inner::Inner;
 use super::pdos::low_half;
 use super::state::SELF_START;
-use super::store::{check_program_control, command};
+use super::store::check_program_control;
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
@@ -160,7 +160,7 @@ impl<D: Definition> Inner<D> {
             Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting
                 if Self::has(Services::STORE) =>
             {
-                self.check_job(command(entry, value)?)
+                self.check_job(self.command(entry, value)?)
             }
             rule if rule.is_command() => Err(Abort::NotStored),
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => self.check_watch(entry, value),
@@ -206,7 +206,7 @@ impl<D: Definition> Inner<D> {
                 if Self::has(Services::STORE) =>
             {
                 // `check` has made sure that the job can begin.
-                let _ = command(entry, value).and_then(|job| self.begin_deferred(job));
+                let _ = self.command(entry, value).and_then(|job| self.begin_deferred(job));
             }
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => {
                 self.configure_watch(entry.sub(), now);

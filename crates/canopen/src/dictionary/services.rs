@@ -38,6 +38,9 @@ impl Services {
     /// SDO client: the rows have 1280h or a further object of this kind.
     pub const SDO_CLIENT: Services = Services(1 << 11);
 
+    /// Storage groups of the product: the rows have a sub-index of 4 and up in 1010h or 1011h.
+    pub const OWN_GROUPS: Services = Services(1 << 12);
+
     /// TPDOs, RPDOs, the heartbeat consumer, the multiplexed TPDO and further SDO servers follow from the numbers in
     /// [`Sizes`](super::Sizes).
     pub(crate) const TPDO: Services = Services(1 << 16);
@@ -61,6 +64,7 @@ impl Services {
             services = services.with(match row.rule {
                 Rule::SyncCobId => Services::SYNC,
                 Rule::EmcyCobId => Services::EMCY,
+                Rule::Store | Rule::Restore if row.sub > 3 => Services::STORE.with(Services::OWN_GROUPS),
                 Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting => Services::STORE,
                 Rule::SyncProducer => Services::SYNC.with(Services::SYNC_PRODUCER),
                 Rule::GuardTime => Services::GUARDING,

@@ -18,6 +18,7 @@ mod lss;
 mod mapping;
 mod multiplexed;
 mod nmt;
+mod own_groups;
 mod producers;
 mod requests;
 mod robustness;
