@@ -30,6 +30,11 @@ pub trait Application {
     /// [`Abort::Command`], and the client downloads in segments.
     const BLOCK_DOWNLOAD: bool = true;
 
+    /// Whether the application uploads domains in parts ([`begin_upload`](Application::begin_upload)) and learns of a
+    /// download that ends before it is complete ([`download_aborted`](Application::download_aborted)). Without it, the
+    /// content of a domain is one slice ([`read_domain`](Application::read_domain)).
+    const DOMAIN_PARTS: bool = false;
+
     /// Whether SDO requests of less than eight bytes are taken, as if zeros followed. CiA 301, 7.2.4.3, demands eight
     /// bytes, but some older controllers send less. Otherwise such a request is ignored.
     const SHORT_REQUESTS: bool = false;
@@ -190,6 +195,36 @@ pub trait Application {
     fn read_domain(&self, _at: Multiplexer) -> Result<&[u8], Abort> {
         Err(Abort::Access)
     }
+
+    /// An SDO client begins to read a domain. Returns the number of bytes; the parts follow
+    /// ([`upload_part`](Application::upload_part)), then the end ([`end_upload`](Application::end_upload)). `None` for a
+    /// domain that [`read_domain`](Application::read_domain) gives as a whole.
+    ///
+    /// With a second SDO server, two clients can read the same domain at the same time: an application that cannot serve
+    /// both refuses with [`Abort::DeviceState`].
+    ///
+    /// # Errors
+    /// The reason why the domain cannot be read.
+    fn begin_upload(&mut self, _at: Multiplexer) -> Result<Option<usize>, Abort> {
+        Ok(None)
+    }
+
+    /// Fills `part` with the content of the domain from `offset` on. A client that has lost a block asks for it again, so
+    /// the offset can go back by up to 889 bytes.
+    ///
+    /// # Errors
+    /// The reason to abort the upload.
+    fn upload_part(&mut self, _at: Multiplexer, _offset: usize, _part: &mut [u8]) -> Result<(), Abort> {
+        Err(Abort::Access)
+    }
+
+    /// The upload that [`begin_upload`](Application::begin_upload) has begun is over: complete, or aborted by either
+    /// side, by a time-out, by a new transfer of the client, or by the NMT state.
+    fn end_upload(&mut self, _at: Multiplexer, _is_complete: bool) {}
+
+    /// A download whose [`Part::Begin`] was accepted is over without an accepted [`Part::End`], for one of the reasons of
+    /// [`end_upload`](Application::end_upload). Called with [`DOMAIN_PARTS`](Application::DOMAIN_PARTS) only.
+    fn download_aborted(&mut self, _at: Multiplexer) {}
 
     /// A download to a DOMAIN entry. The parts arrive in order, from [`Part::Begin`] to [`Part::End`]. A download that
     /// is aborted has no [`Part::End`].

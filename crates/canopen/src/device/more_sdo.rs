@@ -41,7 +41,7 @@ impl<D: Definition> Device<D> {
         for (number, channel) in self.services.more_sdo.as_mut().iter_mut().enumerate() {
             match self.inner.server_ids(number) {
                 Some((_, response)) => channel.poll(response, &mut self.inner, context),
-                None => channel.forget(),
+                None => channel.forget(&mut self.inner),
             }
         }
     }
@@ -55,7 +55,7 @@ impl<D: Definition> Device<D> {
     ) {
         for (number, channel) in self.services.more_sdo.as_mut().iter_mut().enumerate() {
             if let Some((_, response)) = self.inner.server_ids(number) {
-                channel.release(result, response, context);
+                channel.release(result, response, &mut self.inner, context);
             }
         }
     }

@@ -13,6 +13,7 @@ use crate::{CobId, Instant, sync, time_stamp};
 impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
     const BLOCK_DOWNLOAD: bool = D::Application::BLOCK_DOWNLOAD;
+    const PARTS: bool = D::Application::DOMAIN_PARTS;
     /// For a heartbeat and an LSS response, and beside process data for all PDOs of a SYNC, a heartbeat and an EMCY.
     const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
 
@@ -74,14 +75,39 @@ impl<D: Definition> Objects for Inner<D> {
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         self.application.write_domain(at, part)
     }
+
+    fn abandon(&mut self, at: Multiplexer) {
+        self.application.download_aborted(at);
+    }
+
+    fn open(&mut self, at: Multiplexer) -> Result<Option<usize>, Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if !entry.attributes.access.is_readable() {
+            return Err(Abort::WriteOnly);
+        }
+        if entry.is_domain() { self.application.begin_upload(at) } else { Ok(None) }
+    }
+
+    fn part(&mut self, at: Multiplexer, offset: usize, part: &mut [u8]) -> Result<(), Abort> {
+        self.application.upload_part(at, offset, part)
+    }
+
+    fn close(&mut self, at: Multiplexer, is_complete: bool) {
+        self.application.end_upload(at, is_complete);
+    }
 }
 
 impl<D: Definition> Inner<D> {
     /// Writes a domain whose download arrived in one piece.
     fn write_domain(&mut self, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
-        self.application.write_domain(at, Part::Begin(Some(bytes.len())))?;
-        self.application.write_domain(at, Part::Data(0, bytes))?;
-        self.application.write_domain(at, Part::End(bytes.len()))
+        let application = &mut self.application;
+        application.write_domain(at, Part::Begin(Some(bytes.len())))?;
+        let data = application.write_domain(at, Part::Data(0, bytes));
+        let result = data.and_then(|()| application.write_domain(at, Part::End(bytes.len())));
+        if D::Application::DOMAIN_PARTS && result.is_err() {
+            application.download_aborted(at);
+        }
+        result
     }
 
     /// Writes an entry whose values the application accepts or refuses.

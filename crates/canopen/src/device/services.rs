@@ -58,8 +58,8 @@ impl<D: Definition> Services<D> {
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.
-    pub(super) fn restart(&mut self) -> Option<NodeId> {
-        self.forget_transfers();
+    pub(super) fn restart(&mut self, inner: &mut Inner<D>) -> Option<NodeId> {
+        self.forget_transfers(inner);
         if D::Application::LSS {
             self.lss.restart();
         }
@@ -73,9 +73,9 @@ impl<D: Definition> Services<D> {
         channels.all(Channel::is_between_requests) && self.lss.due() == Instant::NEVER
     }
 
-    fn forget_transfers(&mut self) {
-        self.sdo.forget();
-        self.more_sdo.as_mut().iter_mut().for_each(Channel::forget);
+    fn forget_transfers(&mut self, inner: &mut Inner<D>) {
+        self.sdo.forget(inner);
+        self.more_sdo.as_mut().iter_mut().for_each(|sdo| sdo.forget(inner));
     }
 
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
@@ -212,7 +212,7 @@ impl<D: Definition> Device<D> {
         if D::Application::LSS && lss_waits {
             self.services.lss.respond(lss::Slave::stored(result.is_ok()), context);
         }
-        self.services.sdo.release(result, self.inner.service(SDO_RESPONSE), context);
+        self.services.sdo.release(result, self.inner.service(SDO_RESPONSE), &mut self.inner, context);
         if Inner::<D>::has(Has::SDO_SERVERS) {
             self.release_more(result, context);
         }
@@ -222,7 +222,7 @@ impl<D: Definition> Device<D> {
     /// Forgets the transfer in a state without SDO.
     pub(super) fn silence_services(&mut self) {
         if !self.inner.state.has_services() {
-            self.services.forget_transfers();
+            self.services.forget_transfers(&mut self.inner);
         }
     }
 

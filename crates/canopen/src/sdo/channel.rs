@@ -26,8 +26,8 @@ impl<O: Objects> Channel<O> {
     }
 
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
-    pub(crate) fn forget(&mut self) {
-        self.server.reset();
+    pub(crate) fn forget(&mut self, objects: &mut O) {
+        self.server.reset(objects);
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
     }
 
@@ -95,9 +95,10 @@ impl<O: Objects> Channel<O> {
         &mut self,
         result: Result<(), Abort>,
         id: CanId,
+        objects: &mut O,
         context: &mut Context<'_, impl Transmit>,
     ) {
-        if self.server.release(result, context.now) {
+        if self.server.release(result, objects, context.now) {
             self.respond(id, context);
         }
     }
@@ -105,7 +106,7 @@ impl<O: Objects> Channel<O> {
     /// Sends what is due: a reply or a block that found the queue full, or the abort message of a time-out.
     pub(crate) fn poll(&mut self, id: CanId, objects: &mut O, context: &mut Context<'_, impl Transmit>) {
         // Both are checked: the deadline of the transfer may have passed while a reply waited for room.
-        let is_expired = self.server.expire(context.now);
+        let is_expired = self.server.expire(objects, context.now);
         if is_expired || context.now >= self.reply_due {
             self.respond(id, context);
         }

@@ -35,6 +35,8 @@ pub trait Objects {
     const BLOCK_UPLOAD: bool;
     /// Whether block downloads are supported.
     const BLOCK_DOWNLOAD: bool;
+    /// Whether domains can be uploaded in parts, and the end of an incomplete transfer is reported.
+    const PARTS: bool;
     /// Free places in the transmit queue that a block upload leaves.
     const RESERVED_ROOM: usize;
 
@@ -49,6 +51,14 @@ pub trait Objects {
     fn take_deferred(&mut self) -> bool;
     /// Hands over a part of a domain.
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
+    /// A download of a domain has ended before it was complete.
+    fn abandon(&mut self, at: Multiplexer);
+    /// Begins an upload in parts. Returns the length; `None` for an entry that [`read`](Objects::read) gives as a whole.
+    fn open(&mut self, at: Multiplexer) -> Result<Option<usize>, Abort>;
+    /// Fills `part` with the content from `offset` on.
+    fn part(&mut self, at: Multiplexer, offset: usize, part: &mut [u8]) -> Result<(), Abort>;
+    /// An upload in parts has ended.
+    fn close(&mut self, at: Multiplexer, is_complete: bool);
 }
 
 /// The data of an upload. A value that fits the buffer is copied there, so that it cannot change during the transfer. A
@@ -57,7 +67,12 @@ pub trait Objects {
 pub(super) struct Source {
     at: Multiplexer,
     len: usize,
+    /// For an upload in parts, the offset of the part in the buffer; [`NO_PART`] before the first one.
+    part: Option<usize>,
 }
+
+/// An offset beyond every domain: the buffer has no part of it.
+const NO_PART: usize = usize::MAX;
 
 impl Source {
     pub(super) fn new(at: Multiplexer, value: &[u8], buffer: &mut [u8; BUFFER]) -> Source {
@@ -65,7 +80,23 @@ impl Source {
         if let Some(place) = buffer.get_mut(..len) {
             copy(place, value);
         }
-        Source { at, len }
+        Source { at, len, part: None }
+    }
+
+    /// An upload in parts.
+    pub(super) fn in_parts(at: Multiplexer, len: usize) -> Source {
+        Source { at, len, part: Some(NO_PART) }
+    }
+
+    pub(super) fn is_in_parts(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// The upload has ended.
+    pub(super) fn close(&self, is_complete: bool, objects: &mut impl Objects) {
+        if self.is_in_parts() {
+            objects.close(self.at, is_complete);
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -88,14 +119,38 @@ impl Source {
     }
 
     /// The next bytes from `offset` on, at most seven.
-    pub(super) fn piece(
-        &self,
+    pub(super) fn piece<O: Objects>(
+        &mut self,
         offset: usize,
-        buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut O,
     ) -> Result<Bytes<7>, Abort> {
+        if O::PARTS && self.is_in_parts() {
+            return self.piece_of_part(offset, buffer, objects);
+        }
         let content = self.content(buffer, objects)?;
         Ok(Bytes::from_slice(content.get(offset..).unwrap_or(&[])))
+    }
+}
+
+impl Source {
+    /// The next bytes of an upload in parts. The buffer holds 16 segments, so no segment is in two parts.
+    #[inline(never)]
+    fn piece_of_part(
+        &mut self,
+        offset: usize,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<Bytes<7>, Abort> {
+        let len = |start: usize| self.len.saturating_sub(start).min(BUFFER);
+        let held = self.part.filter(|start| *start <= offset && offset - *start < BUFFER);
+        let start = held.unwrap_or(offset);
+        if held.is_none() {
+            self.part = Some(NO_PART);
+            objects.part(self.at, start, buffer.get_mut(..len(start)).unwrap_or_default())?;
+            self.part = Some(start);
+        }
+        Ok(Bytes::from_slice(buffer.get(offset - start..len(start)).unwrap_or_default()))
     }
 }
 
@@ -224,6 +279,13 @@ impl Sink {
     /// CRC of all bytes received.
     pub(super) fn crc(&self, buffer: &[u8; BUFFER]) -> u16 {
         crc::extend(self.crc, self.held(buffer))
+    }
+
+    /// The download has ended before it was complete.
+    pub(super) fn abandon(&self, objects: &mut impl Objects) {
+        if self.kind == Writable::Stream {
+            objects.abandon(self.at);
+        }
     }
 
     pub(super) fn complete(

@@ -13,6 +13,10 @@ pub(super) struct Upload {
 }
 
 impl Upload {
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
     pub(super) fn new(source: Source) -> Upload {
         Upload { source, sent: 0, toggle: false }
     }
@@ -21,7 +25,7 @@ impl Upload {
     pub(super) fn next(
         &mut self,
         requested: bool,
-        buffer: &[u8; BUFFER],
+        buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<Segment, Abort> {
         if requested != self.toggle {
@@ -42,6 +46,10 @@ pub(super) struct Download {
 }
 
 impl Download {
+    pub(super) fn sink(&self) -> &Sink {
+        &self.sink
+    }
+
     pub(super) fn new(sink: Sink) -> Download {
         Download { sink, toggle: false }
     }

@@ -5,6 +5,7 @@ mod bench;
 mod block;
 mod channels;
 mod dictionary;
+mod domains;
 mod emcy;
 mod emcy_detail;
 mod emergencies;

@@ -35,18 +35,18 @@ impl<O: Objects> Server<O> {
             Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
             Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
             Request::Abort(..) => {
-                self.transfer = Transfer::Idle;
+                self.abandon(objects);
                 Ok(false)
             }
             Request::BlockDownload { at, .. } if !O::BLOCK_DOWNLOAD => {
-                self.begin(at);
+                self.begin(at, objects);
                 Err(Abort::Command)
             }
             Request::BlockDownloadEnd(_) if !O::BLOCK_DOWNLOAD => Err(Abort::Command),
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
             Request::BlockUpload { at, .. } if !O::BLOCK_UPLOAD => {
-                self.begin(at);
+                self.begin(at, objects);
                 Err(Abort::Command)
             }
             _ if !O::BLOCK_UPLOAD => Err(Abort::Command),
@@ -63,7 +63,11 @@ impl<O: Objects> Server<O> {
             // A confirmation has no answer, so a repetition is ignored. A refused confirmation is refused again.
             Request::BlockUploadEnded if is_repeated && !self.is_answered => Ok(false),
             Request::BlockUploadEnded => {
-                self.sender()?.ended()?;
+                let sender = self.sender()?;
+                sender.ended()?;
+                if O::PARTS {
+                    sender.source().close(true, objects);
+                }
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
@@ -74,7 +78,7 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
         let at = Multiplexer::parse(frame);
-        self.begin(at);
+        self.begin(at, objects);
         // Most downloads are expedited: their data is used directly from the frame.
         let result = match Initiate::expedited(frame) {
             Some(data) => objects.write(at, data, now),
@@ -88,18 +92,23 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(super) fn initiate_upload(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
         let answer = self.upload(Multiplexer::parse(frame), objects);
-        self.settle(answer, now)
+        self.settle(answer, objects, now)
     }
 
     /// Begins a transfer. A transfer that is under way is forgotten: its client has started over.
-    fn begin(&mut self, at: Multiplexer) {
-        self.transfer = Transfer::Idle;
+    fn begin(&mut self, at: Multiplexer, objects: &mut O) {
+        self.abandon(objects);
         self.multiplexer = at;
         self.is_answered = false;
     }
 
     fn upload(&mut self, at: Multiplexer, objects: &mut O) -> Answer {
-        self.begin(at);
+        self.begin(at, objects);
+        if O::PARTS
+            && let Some(len) = objects.open(at)?
+        {
+            return self.upload_parts(Source::in_parts(at, len), at, objects);
+        }
         let value = objects.read(at)?;
         if value.len() <= 4 {
             return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(value))));
@@ -109,10 +118,24 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
     }
 
+    /// Begins an upload in parts, in segments. One to four bytes are in the response itself, which cannot be empty.
+    fn upload_parts(&mut self, mut source: Source, at: Multiplexer, objects: &mut O) -> Answer {
+        if matches!(source.len(), 1..=4) {
+            let piece = source.piece(0, &mut self.buffer, objects);
+            source.close(piece.is_ok(), objects);
+            return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(piece?.as_slice()))));
+        }
+        self.transfer = Transfer::Upload(Upload::new(source));
+        Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
+    }
+
     fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
-        let segment = upload.next(toggle, &self.buffer, objects)?;
+        let segment = upload.next(toggle, &mut self.buffer, objects)?;
         if segment.last {
+            if O::PARTS {
+                upload.source().close(true, objects);
+            }
             self.transfer = Transfer::Idle;
         }
         Ok(self.set_reply(Response::UploadedSegment(segment)))
@@ -147,7 +170,7 @@ impl<O: Objects> Server<O> {
     }
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
-        self.begin(at);
+        self.begin(at, objects);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
@@ -171,14 +194,29 @@ impl<O: Objects> Server<O> {
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
     fn block_upload(&mut self, at: Multiplexer, block_size: u8, threshold: u8, objects: &mut O) -> Answer {
-        self.begin(at);
+        self.begin(at, objects);
+        if O::PARTS {
+            let size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
+            if let Some(len) = objects.open(at)? {
+                let source = Source::in_parts(at, len);
+                return if len <= usize::from(threshold) {
+                    self.upload_parts(source, at, objects)
+                } else {
+                    Ok(self.send_blocks(at, source, size))
+                };
+            }
+        }
         let source = Source::new(at, objects.read(at)?, &mut self.buffer);
         if source.len() <= usize::from(threshold) {
             return self.upload(at, objects);
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
+        Ok(self.send_blocks(at, source, block_size))
+    }
+
+    fn send_blocks(&mut self, at: Multiplexer, source: Source, block_size: BlockSize) -> bool {
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        Ok(self.set_reply(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
+        self.set_reply(Response::BlockUpload { at, crc: true, size: Some(source.size()) })
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {
