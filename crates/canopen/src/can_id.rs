@@ -92,15 +92,17 @@ impl CobId {
     /// As [`check_change`](CobId::check_change), for a service that can use a restricted CAN-ID. Returns the CAN-ID of an
     /// enabled service.
     pub(crate) fn check_place(old: u32, new: u32) -> Result<Option<CanId>, Abort> {
-        let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
-        let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
-        let moves = !old.bit31 && !new.bit31 && old.id != new.id;
-        if moves { Err(Abort::InvalidValue) } else { Ok((!new.bit31).then_some(new.id)) }
+        let is_enabled = |value: u32| value >> 31 == 0;
+        let moves = is_enabled(old) && is_enabled(new) && old != new;
+        match CobId::enabled(new & !(1 << 31)).filter(|_| !moves) {
+            Some(id) => Ok(Some(id).filter(|_| is_enabled(new))),
+            None => Err(Abort::InvalidValue),
+        }
     }
 
-    /// The CAN-ID of an enabled service of base frames: bits 29 to 31 are 0.
+    /// The CAN-ID of an enabled service of base frames: all bits above the CAN-ID are 0.
     pub(crate) fn enabled(value: u32) -> Option<CanId> {
-        CobId::parse(value).filter(|cob_id| !cob_id.bit31 && !cob_id.bit30).map(|cob_id| cob_id.id)
+        u16::try_from(value).ok().and_then(CanId::new)
     }
 
     /// The value as the dictionary stores it.

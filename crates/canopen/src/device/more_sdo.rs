@@ -87,15 +87,25 @@ impl<D: Definition> Inner<D> {
         self.channel_ids(SERVERS + (number as u16 & 0x7F))
     }
 
+    /// The CAN-IDs of further servers, of clients and of consumed EMCYs. The compiler removes all of it where the rows
+    /// have none of them.
+    pub(super) fn more_service_ids(&self) -> impl Iterator<Item = CanId> {
+        let mut ids = self.emcy_ids().chain(self.server_requests()).chain(self.client_responses());
+        let has_any = Self::has(Services::EMCY_CONSUMER)
+            || Self::has(Services::SDO_SERVERS)
+            || Self::has(Services::SDO_CLIENT);
+        core::iter::from_fn(move || if has_any { ids.next() } else { None })
+    }
+
     /// The CAN-IDs of requests to the further servers.
-    pub(super) fn more_sdo_ids(&self) -> impl Iterator<Item = CanId> {
+    fn server_requests(&self) -> impl Iterator<Item = CanId> {
         let servers = self.dictionary.indexes(SERVERS, CLIENTS);
         let servers = servers.filter(|_| Self::has(Services::SDO_SERVERS));
         servers.filter_map(|index| self.channel_ids(index).map(|(request, _)| request))
     }
 
     /// The CAN-IDs of responses to the clients.
-    pub(super) fn sdo_client_ids(&self) -> impl Iterator<Item = CanId> {
+    fn client_responses(&self) -> impl Iterator<Item = CanId> {
         let clients = self.dictionary.indexes(CLIENTS, CLIENTS + MOST_CLIENTS);
         let clients = clients.filter(|_| Self::has(Services::SDO_CLIENT));
         clients.filter_map(|index| self.channel_ids(index).map(|(_, response)| response))

@@ -146,7 +146,7 @@ impl<D: Definition> Device<D> {
         let own = self.inner.node_id.filter(|_| Inner::<D>::has(Has::GUARDING));
         let guarding = own.map(|own| own.service(ERROR_CONTROL));
         let own = lss.into_iter().chain(sdo).chain(guarding).chain(self.inner.watches.ids());
-        own.chain(self.inner.emcy_ids()).chain(self.inner.more_sdo_ids()).chain(self.inner.sdo_client_ids())
+        own.chain(self.inner.more_service_ids())
     }
 
     /// Takes a request to the SDO server.

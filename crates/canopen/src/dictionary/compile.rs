@@ -329,21 +329,30 @@ pub(super) const fn can_be_multiplexed(count: &Object) -> bool {
 #[macro_export]
 macro_rules! device {
     ($application:ty, room: $sizes:expr) => {
-        $crate::Device<
-            $crate::plumbing::Rows<
-                $application,
-                { $sizes.image },
-                { $sizes.tpdos },
-                { $sizes.rpdos },
-                { $sizes.watches },
-                { $sizes.scanned },
-                { $sizes.servers },
-                { $sizes.services.bits() },
-            >,
+        $crate::Device<$crate::definition!($application, room: $sizes)>
+    };
+    ($application:ty, $rows:expr) => {
+        $crate::Device<$crate::definition!($application, $rows)>
+    };
+}
+
+/// The [`Definition`](crate::Definition) of [`device!`](crate::device!), for code that is generic over devices.
+#[macro_export]
+macro_rules! definition {
+    ($application:ty, room: $sizes:expr) => {
+        $crate::plumbing::Rows<
+            $application,
+            { $sizes.image },
+            { $sizes.tpdos },
+            { $sizes.rpdos },
+            { $sizes.watches },
+            { $sizes.scanned },
+            { $sizes.servers },
+            { $sizes.services.bits() },
         >
     };
     ($application:ty, $rows:expr) => {
-        $crate::device!($application, room: $crate::dictionary::Sizes::of($rows))
+        $crate::definition!($application, room: $crate::dictionary::Sizes::of($rows))
     };
 }
 
