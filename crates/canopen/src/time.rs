@@ -66,7 +66,7 @@ impl Span {
 /// The services of a device reach at most 71 minutes into the future and [`Clock::PAST`] into the past, so 32 bits are
 /// enough for them. They take half the code and half the memory of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Tick(pub(crate) u32);
+pub struct Tick(pub(crate) u32);
 
 impl Tick {
     /// Later than any other tick: no deadline.

@@ -15,7 +15,7 @@ use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_sta
 /// A device without its SDO server and its LSS slave, which act on it.
 // In this order, a short instruction reaches most fields: bytes and words come first, arrays last.
 #[repr(C)]
-pub(super) struct Inner<D: Definition> {
+pub struct Inner<D: Definition> {
     pub(super) state: State,
     /// `None` for a device that waits for a node-ID from LSS.
     pub(super) node_id: Option<NodeId>,
@@ -55,10 +55,6 @@ pub(super) struct Inner<D: Definition> {
 }
 
 impl<D: Definition> Inner<D> {
-    /// Free places in the transmit queue that a block upload leaves: for a heartbeat and an LSS response, and beside
-    /// process data for all PDOs of a SYNC, a heartbeat and an EMCY.
-    pub(super) const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
-
     /// A device that has not started.
     pub(super) fn new(
         dictionary: &'static Dictionary,
@@ -221,6 +217,9 @@ impl<D: Definition> Inner<D> {
         if everything {
             self.load_stored(Group::Application);
             self.load_stored(Group::Calibration);
+            if Self::has(Services::OWN_GROUPS) {
+                Group::OWN.into_iter().for_each(|group| self.load_stored(group));
+            }
         }
     }
 

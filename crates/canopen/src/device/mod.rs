@@ -11,10 +11,12 @@
 
 mod application;
 mod definition;
+mod emergencies;
 mod events;
 mod faults;
 mod inner;
 mod lss;
+mod more_sdo;
 mod multiplexed;
 mod next;
 mod objects;
@@ -62,7 +64,7 @@ impl<D: Definition> core::fmt::Debug for Device<D> {
 ///
 /// [`service_device!`](crate::service_device!) gives the type for a table of rows. Rows of other services hold values
 /// without any effect.
-pub type ServiceDevice<A, const N: usize> = Device<Rows<A, N, 0, 0, 0, 0, 0>>;
+pub type ServiceDevice<A, const N: usize> = Device<Rows<A, N, 0, 0, 0, 0, 0, 0>>;
 
 /// A deadline in the past: the next poll checks everything.
 const STALE: Tick = Tick(0);

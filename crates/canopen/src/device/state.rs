@@ -135,7 +135,7 @@ impl<D: Definition> Device<D> {
     /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let now = self.tick(now);
-        let node_id = self.services.restart();
+        let node_id = self.services.restart(&mut self.inner);
         self.inner.enter(State::Initialising);
         self.inner.node_id = node_id;
         self.load();

@@ -190,6 +190,29 @@ impl<D: Definition> Inner<D> {
         }
     }
 
+    /// The job that a write to a command begins. A calibration cannot be restored: no defaults would fit a real transducer.
+    pub(super) fn command(&self, entry: &Entry, value: u32) -> Result<Job, Abort> {
+        match (entry.rule(), value) {
+            (Rule::Setting, _) => Ok(Job::Setting(value.to_le_bytes()[0])),
+            (Rule::StoreCalibration, SAVE) => Ok(Job::Store(Groups::one(Group::Calibration))),
+            (Rule::Store, SAVE) => self.groups_of(entry).map(Job::Store),
+            (Rule::Restore, LOAD) => self.groups_of(entry).map(Job::Restore),
+            (Rule::Store | Rule::Restore, _) => self.groups_of(entry).and(Err(Abort::NotStored)),
+            _ => Err(Abort::NotStored),
+        }
+    }
+
+    /// The groups of a sub-index of 1010h or 1011h. Sub-index 1 covers the groups of the product, too.
+    fn groups_of(&self, entry: &Entry) -> Result<Groups, Abort> {
+        let mut groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
+        if Self::has(Services::OWN_GROUPS) && entry.sub() == 1 {
+            for group in Group::OWN {
+                groups.set(group, self.dictionary.find(entry.index(), group.sub()).is_ok());
+            }
+        }
+        Ok(groups)
+    }
+
     /// Loads the stored values of a group. If they are damaged or do not fit, the whole group keeps its defaults.
     pub(super) fn load_stored(&mut self, group: Group) {
         let Stored { packed, soundness } = self.application.stored(group);
@@ -212,28 +235,13 @@ impl<D: Definition> Inner<D> {
 
     /// Reports groups that could not be loaded, by EMCY.
     pub(super) fn report_stored(&mut self, now: Tick) {
-        for group in Group::ALL {
+        let groups = if Self::has(Services::OWN_GROUPS) { &Group::ALL[..] } else { &Group::COMMON[..] };
+        for &group in groups {
             let (lost, older) = (self.lost.contains(group), self.older.contains(group));
             self.set_fault(Fault::StoredData(group), lost, now);
             self.set_fault(Fault::OlderData(group), older, now);
         }
     }
-}
-
-/// The job that a write to a command begins. A calibration cannot be restored: no defaults would fit a real transducer.
-pub(super) fn command(entry: &Entry, value: u32) -> Result<Job, Abort> {
-    match (entry.rule(), value) {
-        (Rule::Setting, _) => Ok(Job::Setting(value.to_le_bytes()[0])),
-        (Rule::StoreCalibration, SAVE) => Ok(Job::Store(Groups::one(Group::Calibration))),
-        (Rule::Store, SAVE) => groups_of(entry).map(Job::Store),
-        (Rule::Restore, LOAD) => groups_of(entry).map(Job::Restore),
-        (Rule::Store | Rule::Restore, _) => groups_of(entry).and(Err(Abort::NotStored)),
-        _ => Err(Abort::NotStored),
-    }
-}
-
-fn groups_of(entry: &Entry) -> Result<Groups, Abort> {
-    Groups::of_sub(entry.sub()).ok_or(Abort::Access)
 }
 
 /// Checks a command for the running program (1F51h).

@@ -2,7 +2,6 @@
 
 use super::history::History;
 use super::{Condition, ErrorClass, Fault, FaultSet, Message};
-use crate::sdo::Abort;
 use crate::transmit::{Context, RETRY};
 use crate::{CobId, Frame, Span, Tick, Transmit};
 use heapless::Deque;
@@ -243,13 +242,4 @@ impl Producer {
 /// The bit of a class in a set of eight; 0 for a class beyond them.
 fn error_bit(ErrorClass(sub): ErrorClass) -> u8 {
     1_u8.checked_shl(sub.into()).unwrap_or(0)
-}
-
-/// Checks a new value of 1014h: the CAN-ID can change only while EMCY is disabled (bit 31). EMCY that is enabled needs a
-/// configurable CAN-ID.
-pub(crate) fn check_cob_id(old: u32, new: u32) -> Result<(), Abort> {
-    let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
-    let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
-    let moves = !old.bit31 && old.id != new.id;
-    if !new.bit31 && (moves || new.id.is_restricted()) { Err(Abort::InvalidValue) } else { Ok(()) }
 }

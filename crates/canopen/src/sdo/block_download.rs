@@ -28,6 +28,10 @@ impl Receiver {
         Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None }
     }
 
+    pub(super) fn sink(&self) -> &Sink {
+        &self.sink
+    }
+
     /// Whether the next frame is a segment and not a request.
     pub(super) fn expects_segments(&self) -> bool {
         self.last.is_none()

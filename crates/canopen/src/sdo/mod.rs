@@ -8,6 +8,7 @@ mod block;
 mod block_download;
 mod block_upload;
 mod bytes;
+mod channel;
 pub(crate) mod crc;
 mod objects;
 mod request;
@@ -18,11 +19,12 @@ mod server;
 pub use abort::Abort;
 pub use block::{BlockEnd, BlockSegment, BlockSize};
 pub use bytes::Bytes;
+pub use channel::Channel;
 pub use objects::Part;
 pub(crate) use objects::{BUFFER, Objects, Writable};
 pub use request::{Initiate, Request};
 pub use response::Response;
-pub(crate) use server::Server;
+use server::Server;
 
 /// The object of a transfer: index and sub-index, bytes 1 to 3 of the frames that initiate a transfer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

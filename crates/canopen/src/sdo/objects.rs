@@ -1,7 +1,7 @@
 //! The interface of the server to the objects, and the two ends of a transfer: the source of an upload and the sink of
 //! a download.
 
-use super::{Abort, Multiplexer, crc};
+use super::{Abort, Bytes, Multiplexer, crc};
 use crate::Tick;
 use crate::copy::copy;
 
@@ -22,7 +22,7 @@ pub enum Part<'a> {
 
 /// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Writable {
+pub enum Writable {
     /// The entry takes one value of at most this many bytes.
     Value(usize),
     /// The entry is a domain and takes its content in parts.
@@ -30,11 +30,15 @@ pub(crate) enum Writable {
 }
 
 /// The dictionary with its values and rules, as the server uses it.
-pub(crate) trait Objects {
+pub trait Objects {
     /// Whether block uploads are supported.
     const BLOCK_UPLOAD: bool;
     /// Whether block downloads are supported.
     const BLOCK_DOWNLOAD: bool;
+    /// Whether domains can be uploaded in parts, and the end of an incomplete transfer is reported.
+    const PARTS: bool;
+    /// Free places in the transmit queue that a block upload leaves.
+    const RESERVED_ROOM: usize;
 
     /// The value of an entry. The application may set it before.
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort>;
@@ -47,6 +51,14 @@ pub(crate) trait Objects {
     fn take_deferred(&mut self) -> bool;
     /// Hands over a part of a domain.
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
+    /// A download of a domain has ended before it was complete.
+    fn abandon(&mut self, at: Multiplexer);
+    /// Begins an upload in parts. Returns the length; `None` for an entry that [`read`](Objects::read) gives as a whole.
+    fn open(&mut self, at: Multiplexer) -> Result<Option<usize>, Abort>;
+    /// Fills `part` with the content from `offset` on.
+    fn part(&mut self, at: Multiplexer, offset: usize, part: &mut [u8]) -> Result<(), Abort>;
+    /// An upload in parts has ended.
+    fn close(&mut self, at: Multiplexer, is_complete: bool);
 }
 
 /// The data of an upload. A value that fits the buffer is copied there, so that it cannot change during the transfer. A
@@ -55,7 +67,12 @@ pub(crate) trait Objects {
 pub(super) struct Source {
     at: Multiplexer,
     len: usize,
+    /// For an upload in parts, the offset of the part in the buffer; [`NO_PART`] before the first one.
+    part: Option<usize>,
 }
+
+/// An offset beyond every domain: the buffer has no part of it.
+const NO_PART: usize = usize::MAX;
 
 impl Source {
     pub(super) fn new(at: Multiplexer, value: &[u8], buffer: &mut [u8; BUFFER]) -> Source {
@@ -63,7 +80,23 @@ impl Source {
         if let Some(place) = buffer.get_mut(..len) {
             copy(place, value);
         }
-        Source { at, len }
+        Source { at, len, part: None }
+    }
+
+    /// An upload in parts.
+    pub(super) fn in_parts(at: Multiplexer, len: usize) -> Source {
+        Source { at, len, part: Some(NO_PART) }
+    }
+
+    pub(super) fn is_in_parts(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// The upload has ended.
+    pub(super) fn close(&self, is_complete: bool, objects: &mut impl Objects) {
+        if self.is_in_parts() {
+            objects.close(self.at, is_complete);
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -83,6 +116,25 @@ impl Source {
     ) -> Result<&'a [u8], Abort> {
         let content = if self.len <= BUFFER { buffer } else { objects.read(self.at)? };
         content.get(..self.len).ok_or(Abort::General)
+    }
+
+    /// The next bytes of an upload in parts. The buffer holds 16 segments, so no segment is in two parts.
+    #[inline(never)]
+    pub(super) fn piece(
+        &mut self,
+        offset: usize,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<Bytes<7>, Abort> {
+        let len = |start: usize| self.len.saturating_sub(start).min(BUFFER);
+        let held = self.part.filter(|start| *start <= offset && offset - *start < BUFFER);
+        let start = held.unwrap_or(offset);
+        if held.is_none() {
+            self.part = Some(NO_PART);
+            objects.part(self.at, start, buffer.get_mut(..len(start)).unwrap_or_default())?;
+            self.part = Some(start);
+        }
+        Ok(Bytes::from_slice(buffer.get(offset - start..len(start)).unwrap_or_default()))
     }
 }
 
@@ -211,6 +263,13 @@ impl Sink {
     /// CRC of all bytes received.
     pub(super) fn crc(&self, buffer: &[u8; BUFFER]) -> u16 {
         crc::extend(self.crc, self.held(buffer))
+    }
+
+    /// The download has ended before it was complete.
+    pub(super) fn abandon(&self, objects: &mut impl Objects) {
+        if self.kind == Writable::Stream {
+            objects.abandon(self.at);
+        }
     }
 
     pub(super) fn complete(

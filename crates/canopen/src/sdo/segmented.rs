@@ -14,35 +14,43 @@ pub(super) struct Upload {
 }
 
 impl Upload {
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
     pub(super) fn new(source: Source) -> Upload {
         Upload { source, sent: 0, toggle: false }
     }
 
     /// The frame of the next segment, and whether it is the last one.
-    pub(super) fn next(
+    pub(super) fn next<O: Objects>(
         &mut self,
         requested: bool,
-        buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut O,
     ) -> Result<([u8; 8], bool), Abort> {
         if requested != self.toggle {
             return Err(Abort::Toggle);
         }
-        let content = self.source.content(buffer, objects)?.get(self.sent..).unwrap_or(&[]);
-        self.toggle = !requested;
-        let toggle = if requested { TOGGLE } else { 0 };
+        let part;
+        let content = if O::PARTS && self.source.is_in_parts() {
+            part = self.source.piece(self.sent, buffer, objects)?;
+            part.as_slice()
+        } else {
+            self.source.content(buffer, objects)?.get(self.sent..).unwrap_or(&[])
+        };
         let mut frame = [0; 8];
         let [command, data @ ..] = &mut frame;
-        if let Some((full, _)) = content.split_first_chunk().filter(|(_, rest)| !rest.is_empty()) {
-            *data = *full;
-            *command = toggle;
-            self.sent += data.len();
-            return Ok((frame, false));
+        let len = content.len().min(data.len());
+        match content.first_chunk() {
+            Some(full) => *data = *full,
+            None => copy(data, content),
         }
-        let len = content.len().min(7);
-        copy(data, content);
-        *command = toggle | in_segment(7 - len) << 1 | 1;
-        Ok((frame, true))
+        self.sent += len;
+        self.toggle = !requested;
+        let is_last = self.sent == self.source.len();
+        *command = if requested { TOGGLE } else { 0 } | in_segment(7 - len) << 1 | u8::from(is_last);
+        Ok((frame, is_last))
     }
 }
 
@@ -60,6 +68,10 @@ pub(super) struct Download {
 }
 
 impl Download {
+    pub(super) fn sink(&self) -> &Sink {
+        &self.sink
+    }
+
     pub(super) fn new(sink: Sink) -> Download {
         Download { sink, toggle: false }
     }

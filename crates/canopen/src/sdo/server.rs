@@ -104,8 +104,8 @@ impl<O: Objects> Server<O> {
     }
 
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
-    pub(crate) fn reset(&mut self) {
-        self.transfer = Transfer::Idle;
+    pub(crate) fn reset(&mut self, objects: &mut O) {
+        self.abandon(objects);
         self.multiplexer = Multiplexer { index: 0, sub: 0 };
         (self.previous, self.is_answered) = ([0; 8], false);
     }
@@ -190,24 +190,38 @@ impl<O: Objects> Server<O> {
     fn conclude(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
         if answer == Ok(true) && objects.take_deferred() {
             self.transfer = Transfer::Deferred;
-            return self.settle(Ok(false), now);
+            return self.settle(Ok(false), objects, now);
         }
-        self.settle(answer, now)
+        self.settle(answer, objects, now)
+    }
+
+    /// Ends the transfer. The application learns of a domain whose transfer is not complete.
+    fn abandon(&mut self, objects: &mut O) {
+        if O::PARTS {
+            match &self.transfer {
+                Transfer::Upload(upload) => upload.source().close(false, objects),
+                Transfer::BlockUpload(sender) => sender.source().close(false, objects),
+                Transfer::Download(download) => download.sink().abandon(objects),
+                Transfer::BlockDownload(receiver) => receiver.sink().abandon(objects),
+                Transfer::Idle | Transfer::Deferred => (),
+            }
+        }
+        self.transfer = Transfer::Idle;
     }
 
     /// Reports the end of a write whose reply was held back. Returns whether there is a reply and its client still
     /// waits.
-    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Tick) -> bool {
+    pub(crate) fn release(&mut self, result: Result<(), Abort>, objects: &mut O, now: Tick) -> bool {
         if !matches!(self.transfer, Transfer::Deferred) {
             return false;
         }
         self.transfer = Transfer::Idle;
-        self.settle(result.map(|()| true), now)
+        self.settle(result.map(|()| true), objects, now)
     }
 
     /// Handles a time-out: acknowledges a block whose last segment was lost, or aborts the transfer. Returns whether
     /// there is a reply.
-    pub(crate) fn expire(&mut self, now: Tick) -> bool {
+    pub(crate) fn expire(&mut self, objects: &mut O, now: Tick) -> bool {
         if now < self.deadline() {
             return false;
         }
@@ -218,21 +232,21 @@ impl<O: Objects> Server<O> {
                 let sequence = receiver.acknowledge();
                 self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
-            _ => self.settle(Err(Abort::TimeOut), now),
+            _ => self.settle(Err(Abort::TimeOut), objects, now),
         }
     }
 
     /// Converts the answer to whether there is a reply. An error ends the transfer.
     #[inline]
-    fn settle(&mut self, answer: Answer, now: Tick) -> bool {
+    fn settle(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
         self.active = now;
-        answer.unwrap_or_else(|abort| self.give_up(abort))
+        answer.unwrap_or_else(|abort| self.give_up(abort, objects))
     }
 
     /// Ends the transfer and stores the abort message.
     #[inline(never)]
-    fn give_up(&mut self, abort: Abort) -> bool {
-        self.transfer = Transfer::Idle;
+    fn give_up(&mut self, abort: Abort, objects: &mut O) -> bool {
+        self.abandon(objects);
         self.is_answered = false;
         self.set_reply(Response::Abort(self.multiplexer, abort.code()))
     }
@@ -252,7 +266,7 @@ impl<O: Objects> Server<O> {
         send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {
         let Transfer::BlockUpload(sender) = &mut self.transfer else { return false };
-        let result = sender.send(&self.buffer, objects, send);
-        self.settle(result.map(|()| false), now)
+        let result = sender.send(&mut self.buffer, objects, send);
+        self.settle(result.map(|()| false), objects, now)
     }
 }

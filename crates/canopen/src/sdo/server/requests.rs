@@ -26,7 +26,7 @@ impl<O: Objects> Server<O> {
             0 => self.download_segment(frame, objects, now),
             3 => self.upload_segment(command & TOGGLE != 0, objects),
             4 => {
-                self.transfer = Transfer::Idle;
+                self.abandon(objects);
                 Ok(false)
             }
             5 => self.block_upload_request(frame, is_repeated, objects),
@@ -48,7 +48,7 @@ impl<O: Objects> Server<O> {
         let [command, ..] = *frame;
         let is_end = command & 1 != 0;
         if !O::BLOCK_DOWNLOAD {
-            return self.refuse_block(is_end, frame);
+            return self.refuse_block(is_end, frame, objects);
         }
         if is_end {
             return self.block_download_end(BlockEnd::parse(frame), objects, now);
@@ -61,14 +61,18 @@ impl<O: Objects> Server<O> {
     fn block_upload_request(&mut self, frame: &[u8; 8], is_repeated: bool, objects: &mut O) -> Answer {
         let [command, sequence, block_size, ..] = *frame;
         if !O::BLOCK_UPLOAD {
-            return self.refuse_block(command & 3 != 0, frame);
+            return self.refuse_block(command & 3 != 0, frame, objects);
         }
         match command & 3 {
             0 => self.block_upload(Multiplexer::parse(frame), frame[4], frame[5], objects),
             // A confirmation has no answer, so a repetition is ignored. A refused confirmation is refused again.
             1 if is_repeated && !self.is_answered => Ok(false),
             1 => {
-                self.sender()?.ended()?;
+                let sender = self.sender()?;
+                sender.ended()?;
+                if O::PARTS {
+                    sender.source().close(true, objects);
+                }
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
@@ -81,9 +85,9 @@ impl<O: Objects> Server<O> {
     }
 
     /// Refuses a request of a block transfer. A request that is not a part of one begins a transfer.
-    fn refuse_block(&mut self, is_part: bool, frame: &[u8; 8]) -> Answer {
+    fn refuse_block(&mut self, is_part: bool, frame: &[u8; 8], objects: &mut O) -> Answer {
         if !is_part {
-            self.begin(Multiplexer::parse(frame));
+            self.begin(Multiplexer::parse(frame), objects);
         }
         Err(Abort::Command)
     }
@@ -92,7 +96,7 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let at = Multiplexer::parse(frame);
-        self.begin(at);
+        self.begin(at, objects);
         // Most downloads are expedited: their data is used directly from the frame.
         let result = match Initiate::expedited(frame) {
             Some(data) => objects.write(at, data, now),
@@ -106,18 +110,23 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(super) fn initiate_upload(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let answer = self.upload(Multiplexer::parse(frame), objects);
-        self.settle(answer, now)
+        self.settle(answer, objects, now)
     }
 
     /// Begins a transfer. A transfer that is under way is forgotten: its client has started over.
-    fn begin(&mut self, at: Multiplexer) {
-        self.transfer = Transfer::Idle;
+    fn begin(&mut self, at: Multiplexer, objects: &mut O) {
+        self.abandon(objects);
         self.multiplexer = at;
         self.is_answered = false;
     }
 
     fn upload(&mut self, at: Multiplexer, objects: &mut O) -> Answer {
-        self.begin(at);
+        self.begin(at, objects);
+        if O::PARTS
+            && let Some(len) = objects.open(at)?
+        {
+            return self.upload_parts(Source::in_parts(at, len), at, objects);
+        }
         let value = objects.read(at)?;
         if value.len() <= 4 {
             return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(value))));
@@ -127,11 +136,25 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
     }
 
+    /// Begins an upload in parts, in segments. One to four bytes are in the response itself, which cannot be empty.
+    fn upload_parts(&mut self, mut source: Source, at: Multiplexer, objects: &mut O) -> Answer {
+        if matches!(source.len(), 1..=4) {
+            let piece = source.piece(0, &mut self.buffer, objects);
+            source.close(piece.is_ok(), objects);
+            return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(piece?.as_slice()))));
+        }
+        self.transfer = Transfer::Upload(Upload::new(source));
+        Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
+    }
+
     fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
         let is_last;
-        (self.reply, is_last) = upload.next(toggle, &self.buffer, objects)?;
+        (self.reply, is_last) = upload.next(toggle, &mut self.buffer, objects)?;
         if is_last {
+            if O::PARTS {
+                upload.source().close(true, objects);
+            }
             self.transfer = Transfer::Idle;
         }
         Ok(true)
@@ -165,7 +188,7 @@ impl<O: Objects> Server<O> {
     }
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
-        self.begin(at);
+        self.begin(at, objects);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
@@ -189,14 +212,29 @@ impl<O: Objects> Server<O> {
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
     fn block_upload(&mut self, at: Multiplexer, block_size: u8, threshold: u8, objects: &mut O) -> Answer {
-        self.begin(at);
+        self.begin(at, objects);
+        if O::PARTS {
+            let size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
+            if let Some(len) = objects.open(at)? {
+                let source = Source::in_parts(at, len);
+                return if len <= usize::from(threshold) {
+                    self.upload_parts(source, at, objects)
+                } else {
+                    Ok(self.send_blocks(at, source, size))
+                };
+            }
+        }
         let source = Source::new(at, objects.read(at)?, &mut self.buffer);
         if source.len() <= usize::from(threshold) {
             return self.upload(at, objects);
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
+        Ok(self.send_blocks(at, source, block_size))
+    }
+
+    fn send_blocks(&mut self, at: Multiplexer, source: Source, block_size: BlockSize) -> bool {
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        Ok(self.set_reply(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
+        self.set_reply(Response::BlockUpload { at, crc: true, size: Some(source.size()) })
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {
