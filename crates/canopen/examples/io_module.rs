@@ -1,9 +1,11 @@
-//! A CiA 401 device on Linux: eight digital inputs and outputs and an analogue input.
+//! A CiA 401 device on Linux: eight digital inputs and outputs and an analogue input. It stores its parameters in files.
 //!
 //! ```text
 //! io_module --eds FILE            writes its data sheet
-//! io_module HOST:PORT BUS NODE    runs on a bus of a socketcand server, such as
+//! io_module HOST:PORT BUS NODE [FILE]
+//!                                 runs on a bus of a socketcand server, such as
 //!                                 `cargo sim -- --socketcand 127.0.0.1:29536`
+//!                                 and stores parameters in FILE.2 (communication) and FILE.3 (application)
 //! ```
 //!
 //! The process is simulated on standard input and output: `inputs 5` and `analogue 1200` set the connected signals, and
@@ -11,15 +13,19 @@
 
 mod socketcand;
 
-use std::io::{self, BufRead, Write};
-use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
+use std::fs;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
 
-use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Mapping, Object, Type};
+use canopen::dictionary::{
+    Access, Dictionary, Entry, Field, Group, Groups, Mapping, Object, Type, packed_size,
+};
 use canopen::eds::DeviceInfo;
 use canopen::nmt::State;
-use canopen::{Action, Application, BusEvent, ErrorClass, Instant, Next, NodeId, objects};
-use socketcand::Bus;
+use canopen::sdo::Abort;
+use canopen::{Application, Device, ErrorClass, Instant, Job, Next, NodeId, Soundness, Stored, objects};
+use socketcand::{Bus, Product, run};
 
 // ------------------------------------------------------------------------------------------------- object dictionary
 
@@ -42,6 +48,8 @@ const ROWS: &[Object] = canopen::rows!(
     objects::error_field::<11>(),
     objects::sync_consumer(),
     [objects::device_name("I/O module"), objects::software_version(env!("CARGO_PKG_VERSION"))],
+    objects::store_parameters(),
+    objects::restore_parameters(),
     objects::emergency(),
     objects::heartbeat_consumer::<3>(),
     [objects::heartbeat_producer(200)],
@@ -82,8 +90,7 @@ const DELTA: Field = DICTIONARY.field(0x6426, 1);
 
 // ------------------------------------------------------------------------------------------------------- application
 
-/// Interval at which the inputs are read. `FILTER_READS`: number of equal reads for a filtered input.
-const PERIOD: canopen::Duration = canopen::Duration::from_millis(10);
+/// Number of equal reads for a filtered input. The inputs are read every 10 ms.
 const FILTER_READS: u8 = 5;
 
 /// The pins, and the state between the pins and the objects.
@@ -98,6 +105,10 @@ struct Io {
     filtered: u8,
     /// The analogue value of the last TPDO.
     sent: i16,
+    /// The stored values of the communication and the application group, as the files had them at the start.
+    packed: [Vec<u8>; 2],
+    /// The groups whose file could not be read.
+    lost: Groups,
 }
 
 impl Io {
@@ -137,6 +148,11 @@ impl Io {
 }
 
 impl Application for Io {
+    fn stored(&self, group: Group) -> Stored<'_> {
+        let soundness = if self.lost.contains(group) { Soundness::Lost } else { Soundness::Whole };
+        Stored { packed: self.packed.get(group as usize).map_or(&[], Vec::as_slice), soundness }
+    }
+
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         if matches!(entry.index(), 0x6200 | 0x6202) {
             self.write_outputs(image);
@@ -160,83 +176,102 @@ impl Application for Io {
     }
 }
 
+// ------------------------------------------------------------------------------------------------------------ storing
+
+/// The device, and the files of its parameters.
+struct Module {
+    file: Option<PathBuf>,
+}
+
+/// Room for the values of either group.
+const ROOM: usize = packed_size(ROWS, Group::Communication) + packed_size(ROWS, Group::Application);
+
+impl Module {
+    /// The file of a group.
+    fn file(&self, group: Group) -> Option<PathBuf> {
+        self.file.as_ref().map(|file| file.with_added_extension(group.sub().to_string()))
+    }
+
+    /// Reads the files.
+    fn load(&self, io: &mut Io) {
+        for group in [Group::Communication, Group::Application] {
+            let Some(file) = self.file(group).filter(|file| file.exists()) else { continue };
+            let content = fs::read(file);
+            io.lost.set(group, content.is_err());
+            io.packed[group as usize] = content.unwrap_or_default();
+        }
+    }
+
+    /// Stores the present values of a group.
+    fn save(&self, group: Group, device: &mut Node) -> Result<(), Abort> {
+        let file = self.file(group).ok_or(Abort::NotStored)?;
+        let mut packed = vec![0; ROOM];
+        let len = DICTIONARY.pack(group, device.node_id(), device.image(), &mut packed);
+        packed.truncate(len.map_err(|_| Abort::OutOfMemory)?);
+        // A power cut leaves the file before or the new one.
+        let new = file.with_added_extension("new");
+        fs::write(&new, &packed).and_then(|()| fs::rename(new, file)).map_err(|_| Abort::Hardware)?;
+        device.application_mut().packed[group as usize] = packed;
+        Ok(())
+    }
+
+    /// Erases the stored values of a group. Its defaults are in use from the next reset on.
+    fn erase(&self, group: Group, device: &mut Node) -> Result<(), Abort> {
+        let file = self.file(group).ok_or(Abort::NotStored)?;
+        if file.exists() {
+            fs::remove_file(file).map_err(|_| Abort::Hardware)?;
+        }
+        device.application_mut().packed[group as usize].clear();
+        Ok(())
+    }
+}
+
 // --------------------------------------------------------------------------------------------------------------- main
 
-type Device = canopen::device!(Io, ROWS);
+type Node = canopen::device!(Io, ROWS);
 
-fn now(since: std::time::Instant) -> Instant {
-    Instant(u64::try_from(since.elapsed().as_micros()).unwrap_or(u64::MAX))
-}
+impl Product for Module {
+    type Definition = canopen::definition!(Io, ROWS);
 
-/// Runs until the connection to the bus is lost.
-fn run(
-    device: &mut Device,
-    bus: &mut Bus,
-    process: &Receiver<String>,
-    start: std::time::Instant,
-) -> io::Result<std::convert::Infallible> {
-    let mut next = device.start(now(start), bus);
-    let mut sample = now(start);
-    loop {
-        let patience = next.due().min(sample).0.saturating_sub(now(start).0);
-        let frame = bus.receive(Duration::from_micros(patience))?;
-        next = match frame {
-            Some(frame) => device.on_frame(&frame, now(start), bus),
-            None => device.poll(now(start), bus),
-        };
-        while let Some(action) = next.action {
-            next = match action {
-                Action::ResetNode | Action::ResetCommunication => device.start(now(start), bus),
-                // There are no acceptance filters, only one bit rate, no bootloader and no memory.
-                _ => device.poll(now(start), bus),
-            };
-        }
-        if now(start) >= sample {
-            sample = now(start) + PERIOD;
-            next = read_process(device, bus, process, now(start));
+    fn store(&mut self, device: &mut Node, job: Job) -> Result<(), Abort> {
+        match job {
+            Job::Store(groups) => groups.iter().try_for_each(|group| self.save(group, device)),
+            Job::Restore(groups) => groups.iter().try_for_each(|group| self.erase(group, device)),
+            _ => Err(Abort::NotStored),
         }
     }
-}
 
-/// Takes the connected signals, and publishes the resulting values.
-fn read_process(device: &mut Device, bus: &mut Bus, process: &Receiver<String>, now: Instant) -> Next {
-    for line in process.try_iter() {
-        let io = device.application_mut();
-        match line.split_once(' ') {
-            Some(("inputs", value)) => io.inputs = value.parse().unwrap_or(io.inputs),
-            Some(("analogue", value)) => io.analogue = value.parse().unwrap_or(io.analogue),
-            _ => eprintln!("what is {line}?"),
+    fn cycle(&mut self, device: &mut Node, bus: &mut Bus, lines: &Receiver<String>, now: Instant) -> Next {
+        for line in lines.try_iter() {
+            let io = device.application_mut();
+            match line.split_once(' ') {
+                Some(("inputs", value)) => io.inputs = value.parse().unwrap_or(io.inputs),
+                Some(("analogue", value)) => io.analogue = value.parse().unwrap_or(io.analogue),
+                _ => eprintln!("what is {line}?"),
+            }
         }
+        let mut is_due = false;
+        let next = device.publish(now, bus, |io, image| is_due = io.sample(image));
+        if is_due { device.send_tpdo(2, now, bus) } else { next }
     }
-    let mut is_due = false;
-    let next = device.publish(now, bus, |io, image| is_due = io.sample(image));
-    if is_due { device.send_tpdo(2, now, bus) } else { next }
 }
 
 fn main() -> io::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (address, bus, node) = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let (address, bus, node, file) = match arguments[..] {
         ["--eds", file] => {
             let mut sheet = String::new();
             let device = DeviceInfo { vendor: "none", product: "I/O module" };
             canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
-            return std::fs::write(file, sheet);
+            return fs::write(file, sheet);
         }
-        [address, bus, node] => (address, bus, node.parse().ok().and_then(NodeId::new)),
-        _ => return Err(io::Error::other("usage: io_module --eds FILE | HOST:PORT BUS NODE")),
+        [address, bus, node] => (address, bus, node, None),
+        [address, bus, node, file] => (address, bus, node, Some(file.into())),
+        _ => return Err(io::Error::other("usage: io_module --eds FILE | HOST:PORT BUS NODE [FILE]")),
     };
-    let (lines, process) = channel();
-    std::thread::spawn(move || {
-        io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| lines.send(line))
-    });
-    let (mut device, start) = (Device::new(&DICTIONARY, node, Io::default()), std::time::Instant::now());
-    loop {
-        if let Ok(mut bus) = Bus::open(address, bus) {
-            let Err(error) = run(&mut device, &mut bus, &process, start);
-            eprintln!("the bus is gone: {error}");
-            // For the outputs, a lost connection is the same as bus-off.
-            let _ = device.on_bus(BusEvent::BusOff, now(start));
-        }
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    let (module, mut io) = (Module { file }, Io::default());
+    module.load(&mut io);
+    let device = Device::new(&DICTIONARY, node.parse().ok().and_then(NodeId::new), io);
+    run(module, device, address, bus)
 }

@@ -42,6 +42,7 @@ pub use frame::Frame;
 pub use node_id::NodeId;
 pub use sdo::Part;
 pub use time::{Duration, Instant};
+use time::{Span, Tick};
 pub use time_stamp::TimeOfDay;
 pub use transmit::{QueueFull, Transmit};
 

@@ -28,11 +28,15 @@
 
 pub mod pdo;
 mod program;
+mod sdo;
+mod storing;
 
 use crate::dictionary::{Access, DefaultValue, Group, Object, Rule, Type, fail};
 
 pub use pdo::{multiplexed, rpdo, rpdos, tpdo, tpdos};
 pub use program::{flash_status, program_control, program_data, program_identification};
+pub use sdo::{default_sdo_server, sdo_client, sdo_server};
+pub use storing::{restore_parameters, restore_parameters_with, store_parameters, store_parameters_with};
 
 /// A read-only value of the device.
 const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -142,28 +146,6 @@ pub const fn software_version(version: &'static str) -> Object {
     text(0x100A, "Manufacturer software version", 50, version)
 }
 
-/// 1010h: store all parameters (sub-index 1), the communication parameters (2) or the application parameters (3).
-#[must_use]
-pub const fn store_parameters() -> [Object; 4] {
-    [
-        Object::new(0x1010, 0, "Store parameters", Type::Unsigned8, Access::Const).value(3),
-        command(0x1010, 1, "Save all"),
-        command(0x1010, 2, "Save communication"),
-        command(0x1010, 3, "Save application"),
-    ]
-}
-
-/// 1011h: restore the defaults of the same groups.
-#[must_use]
-pub const fn restore_parameters() -> [Object; 4] {
-    [
-        Object::new(0x1011, 0, "Restore default parameters", Type::Unsigned8, Access::Const).value(3),
-        command(0x1011, 1, "Restore all"),
-        command(0x1011, 2, "Restore communication"),
-        command(0x1011, 3, "Restore application"),
-    ]
-}
-
 /// 100Ch and 100Dh: node guarding without life guarding. A master that guards the device switches the heartbeat (1017h)
 /// off.
 #[must_use]
@@ -192,6 +174,18 @@ pub const fn heartbeat_consumer<const N: usize>() -> [Object; N] {
     assert!(N >= 2 && N <= 128, "one to 127 nodes are watched");
     let number = Object::highest(0x1016, (N - 1) as u8, "Consumer heartbeat time");
     list(number, parameter(0x1016, 1, "Watched node and time", Type::Unsigned32))
+}
+
+/// 1028h for the nodes 1 to `N` - 1, at most 127: the sub-index is the node-ID, the value the COB-ID of the EMCY of the node.
+/// Bit 31 disables an entry, and is set by default.
+///
+/// # Panics
+/// During compilation, for more than 127 nodes, or for none.
+#[must_use]
+pub const fn emcy_consumer<const N: usize>() -> [Object; N] {
+    assert!(N >= 2 && N <= 128, "the EMCYs of one to 127 nodes are consumed");
+    let number = Object::highest(0x1028, (N - 1) as u8, "Emergency consumer");
+    list(number, parameter(0x1028, 1, "Emergency consumer of node", Type::Unsigned32).value(0x8000_0000))
 }
 
 /// 1017h, producer heartbeat time in ms; 0 for no heartbeat.

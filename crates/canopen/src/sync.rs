@@ -6,7 +6,7 @@ mod producer;
 pub(crate) use producer::Producer;
 
 use crate::sdo::Abort;
-use crate::{CanId, CobId, Duration, Frame, Instant};
+use crate::{CanId, CobId, Frame, Span, Tick};
 
 /// A SYNC message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,8 +38,8 @@ pub(crate) struct Consumer {
     id: CanId,
     settings: Settings,
     /// When the next SYNC is missing; `NEVER` before the first SYNC.
-    due: Instant,
-    window_end: Instant,
+    due: Tick,
+    window_end: Tick,
     is_missing: bool,
 }
 
@@ -48,10 +48,16 @@ impl Consumer {
         Consumer {
             id: CanId::of_service(0x080, 0),
             settings: Settings { cob_id: 0x80, period: 0, window: 0, overflow: 0 },
-            due: Instant::NEVER,
-            window_end: Instant::NEVER,
+            due: Tick::NEVER,
+            window_end: Tick::NEVER,
             is_missing: false,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.due.shift(by);
+        self.window_end.shift(by);
     }
 
     /// Takes new settings. Monitoring begins with the next SYNC.
@@ -63,7 +69,7 @@ impl Consumer {
 
     /// After a change of the NMT state: period and window begin again with the next SYNC.
     pub(crate) fn stop(&mut self) {
-        (self.due, self.window_end, self.is_missing) = (Instant::NEVER, Instant::NEVER, false);
+        (self.due, self.window_end, self.is_missing) = (Tick::NEVER, Tick::NEVER, false);
     }
 
     pub(crate) fn id(&self) -> CanId {
@@ -76,34 +82,34 @@ impl Consumer {
     }
 
     /// Takes a SYNC, that is a frame for which `accepts` is `true`.
-    pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Result<Sync, WrongLength> {
+    pub(crate) fn take(&mut self, frame: &Frame, now: Tick) -> Result<Sync, WrongLength> {
         let counter = match (frame.data(), self.settings.overflow) {
             ([], 0) => None,
             (&[counter], 1..) => Some(counter),
             _ => return Err(WrongLength),
         };
         let Settings { period, window, .. } = self.settings;
-        self.window_end = if window == 0 { Instant::NEVER } else { now.plus(Duration(window.into())) };
+        self.window_end = if window == 0 { Tick::NEVER } else { now.plus_long(window) };
         // A SYNC that is half a period late is missing.
-        self.due = if period == 0 { Instant::NEVER } else { now.plus(Duration(u64::from(period) * 3 / 2)) };
+        self.due = if period == 0 { Tick::NEVER } else { now.plus_long(period.saturating_add(period / 2)) };
         Ok(Sync { counter })
     }
 
     /// Whether the synchronous window after the last SYNC is over.
-    pub(crate) fn is_window_over(&self, now: Instant) -> bool {
+    pub(crate) fn is_window_over(&self, now: Tick) -> bool {
         now > self.window_end
     }
 
     /// The next instant at which a SYNC is missing.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
     /// Whether a SYNC is missing. Reported once.
-    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+    pub(crate) fn expire(&mut self, now: Tick) -> bool {
         let is_missing = now >= self.due;
         if is_missing {
-            (self.due, self.is_missing) = (Instant::NEVER, true);
+            (self.due, self.is_missing) = (Tick::NEVER, true);
         }
         is_missing
     }

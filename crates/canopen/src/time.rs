@@ -36,32 +36,114 @@ pub struct Instant(pub u64);
 impl Instant {
     /// Later than any other instant: no deadline.
     pub const NEVER: Instant = Instant(u64::MAX);
-
-    /// The end of a span that begins at a known instant, such as the present: never near the end of the range. The range
-    /// check of `+` costs more code than the sum.
-    #[inline]
-    pub(crate) const fn plus(self, span: Duration) -> Instant {
-        Instant(self.0 + span.0)
-    }
-
-    /// The next due instant of a timer with a period in milliseconds, 0 for none. It is one period after this due
-    /// instant, so that delays do not add up; after a long gap, or for a timer that starts, one period from now.
-    #[inline(never)]
-    pub(crate) fn following(self, period: u16, now: Instant) -> Instant {
-        if period == 0 {
-            return Instant::NEVER;
-        }
-        let period = Duration::from_millis(period.into());
-        let last = if self == Instant::NEVER { now } else { self };
-        let next = last.plus(period);
-        if next > now { next } else { now.plus(period) }
-    }
 }
 
 impl Add<Duration> for Instant {
     type Output = Instant;
     fn add(self, span: Duration) -> Instant {
         Instant(self.0.saturating_add(span.0))
+    }
+}
+
+/// A time span inside a device, in microseconds: at most 71 minutes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Span(pub(crate) u32);
+
+impl Span {
+    /// `n` milliseconds.
+    pub(crate) const fn from_millis(n: u16) -> Span {
+        Span(n as u32 * 1000)
+    }
+
+    /// `n` units of 100 us, the unit of inhibit times (1015h, 1800h..:3).
+    pub(crate) const fn from_inhibit(n: u16) -> Span {
+        Span(n as u32 * 100)
+    }
+}
+
+/// A point of time inside a device: microseconds since the epoch of its [`Clock`].
+///
+/// The services of a device reach at most 71 minutes into the future and [`Clock::PAST`] into the past, so 32 bits are
+/// enough for them. They take half the code and half the memory of 64 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Tick(pub(crate) u32);
+
+impl Tick {
+    /// Later than any other tick: no deadline.
+    pub(crate) const NEVER: Tick = Tick(u32::MAX);
+
+    /// The end of a span that begins now or in the past.
+    #[inline]
+    pub(crate) const fn plus(self, span: Span) -> Tick {
+        Tick(self.0 + span.0)
+    }
+
+    /// The end of a span of any length. The end is at most 71 minutes after the present.
+    pub(crate) fn plus_long(self, microseconds: u32) -> Tick {
+        Tick(self.0.saturating_add(microseconds).min(u32::MAX - 1))
+    }
+
+    /// The next due tick of a timer with a period in milliseconds, 0 for none. It is one period after this due tick, so
+    /// that delays do not add up; after a long gap, or for a timer that starts, one period from now.
+    #[inline(never)]
+    pub(crate) fn following(self, period: u16, now: Tick) -> Tick {
+        if period == 0 {
+            return Tick::NEVER;
+        }
+        let period = Span::from_millis(period);
+        let last = if self == Tick::NEVER { now } else { self };
+        let next = last.plus(period);
+        if next > now { next } else { now.plus(period) }
+    }
+
+    /// The epoch has moved by a span. A tick before the new epoch becomes 0: it is long past.
+    #[inline(never)]
+    pub(crate) fn shift(&mut self, by: Span) {
+        if *self != Tick::NEVER {
+            self.0 = self.0.saturating_sub(by.0);
+        }
+    }
+}
+
+/// Converts between the time of the caller and the ticks of a device.
+#[derive(Debug)]
+pub(crate) struct Clock {
+    epoch: u64,
+}
+
+impl Clock {
+    /// How far back the services look: inhibit times reach 6.6 s, and all others less.
+    const PAST: u32 = 1 << 23;
+    /// The epoch moves when the present is this far behind it.
+    const LATEST: u32 = 1 << 25;
+
+    pub(crate) const fn new() -> Clock {
+        Clock { epoch: 0 }
+    }
+
+    /// The tick of the present, if the epoch needs not move for it.
+    #[inline]
+    pub(crate) fn tick(&self, now: Instant) -> Option<Tick> {
+        let since = now.0.wrapping_sub(self.epoch);
+        u32::try_from(since).ok().filter(|since| *since < Clock::LATEST).map(Tick)
+    }
+
+    /// Moves the epoch towards the present. Returns the tick of the present, and the span by which all ticks of the
+    /// device shift.
+    ///
+    /// An instant before the epoch is that of a caller whose time went back: the epoch stays.
+    pub(crate) fn follow(&mut self, now: Instant) -> (Tick, Span) {
+        let Some(by) = now.0.saturating_sub(Clock::PAST.into()).checked_sub(self.epoch) else {
+            return (Tick(0), Span(0));
+        };
+        self.epoch += by;
+        (Tick(Clock::PAST), Span(u32::try_from(by).unwrap_or(u32::MAX)))
+    }
+
+    /// The instant of a tick.
+    #[inline]
+    pub(crate) fn instant(&self, tick: Tick) -> Instant {
+        if tick == Tick::NEVER { Instant::NEVER } else { Instant(self.epoch.wrapping_add(tick.0.into())) }
     }
 }
 
@@ -73,5 +155,28 @@ mod tests {
     fn a_span_after_never_is_never() {
         assert_eq!(Instant::NEVER + Duration::from_millis(1), Instant::NEVER);
         assert_eq!(Instant(u64::MAX - 1) + Duration(5), Instant::NEVER);
+    }
+
+    #[test]
+    fn a_tick_keeps_its_instant_when_the_epoch_moves() {
+        let mut clock = Clock::new();
+        let mut due = clock.tick(Instant(20_000_000)).unwrap().plus(Span::from_millis(u16::MAX));
+        assert_eq!(clock.tick(Instant(1 << 25)), None);
+        let (now, by) = clock.follow(Instant(1 << 25));
+        due.shift(by);
+        assert_eq!(clock.instant(now), Instant(1 << 25));
+        assert_eq!(clock.instant(due), Instant(85_535_000));
+        assert_eq!(clock.tick(Instant(1 << 25)), Some(now));
+    }
+
+    #[test]
+    fn no_deadline_stays_none_and_what_is_long_past_stays_past() {
+        let mut clock = Clock::new();
+        let (now, by) = clock.follow(Instant(u64::MAX / 2));
+        let (mut never, mut past) = (Tick::NEVER, Tick(5));
+        never.shift(by);
+        past.shift(by);
+        assert_eq!((never, clock.instant(never)), (Tick::NEVER, Instant::NEVER));
+        assert!(past < now && clock.instant(past) < Instant(u64::MAX / 2));
     }
 }

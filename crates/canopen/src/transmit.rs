@@ -1,6 +1,6 @@
 //! The transmit queue of the driver as the protocols use it.
 
-use crate::{Duration, Frame, Instant};
+use crate::{Frame, Span, Tick};
 
 /// The queue has no room. The sender keeps the frame and tries again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ pub trait Transmit {
 /// One call of the device: its time and the transmit queue. While the bit rate changes, the queue is closed: it accepts
 /// no frame, and the senders try again later.
 pub(crate) struct Context<'a, T> {
-    pub(crate) now: Instant,
+    pub(crate) now: Tick,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
 }
@@ -91,4 +91,4 @@ impl<T: Transmit> Context<'_, T> {
 }
 
 /// When to try again after `QueueFull`.
-pub(crate) const RETRY: Duration = Duration::from_millis(1);
+pub(crate) const RETRY: Span = Span::from_millis(1);

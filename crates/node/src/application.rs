@@ -148,7 +148,7 @@ impl Application for NodeApplication {
     }
 
     fn switches_pdos(&self, entry: &Entry) -> bool {
-        !matches!(entry.index(), PROGRAM_TRIAL | PROGRAM_AUTHORISATION)
+        self.profile.switches_pdos(entry.index())
     }
 
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
@@ -228,5 +228,70 @@ impl Application for NodeApplication {
 
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         self.buffer.write(part)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::BitRate;
+    use canopen::NodeId;
+    use profiles::Personality;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn application(personality: Personality) -> (NodeApplication, Vec<u8>) {
+        let mut application = NodeApplication::new(&Setup {
+            personality,
+            node_id: NodeId::new(5),
+            bit_rate: BitRate::FASTEST,
+            serial_number: 1,
+            program_id: 0,
+            hardware_version: "",
+            software_version: "",
+        });
+        let mut image = vec![0; personality.dictionary().image_size()];
+        personality.dictionary().load_defaults(&mut image);
+        application.initialise(&mut image);
+        (application, image)
+    }
+
+    /// What the PDOs depend on: bit 31 of all COB-IDs, and what is broadcast.
+    fn pdos(application: &NodeApplication, image: &[u8]) -> Vec<bool> {
+        let entries = application.setup.personality.dictionary().entries();
+        let state = |entry: Entry| {
+            let is_cob_id = matches!(entry.index(), 0x1400..=0x15FF | 0x1800..=0x19FF) && entry.sub() == 1;
+            let at = Multiplexer { index: entry.index(), sub: entry.sub() };
+            let is_off = is_cob_id && entry.field().u32(image) >> 31 != 0;
+            [is_off, application.broadcasts(at, image)]
+        };
+        entries.flat_map(state).collect()
+    }
+
+    #[test]
+    fn a_write_that_switches_pdos_is_one_of_an_entry_that_says_so() {
+        for personality in Personality::ALL {
+            let own = |entry: &Entry| entry.index() >= 0x2000;
+            let mut switching = 0;
+            for entry in personality.dictionary().entries().filter(own) {
+                let says_so = application(personality).0.switches_pdos(&entry);
+                switching += usize::from(says_so);
+                for value in [0, 1, 2, 3, 7, 0x0F, 0xFF] {
+                    let (mut application, mut image) = application(personality);
+                    let before = pdos(&application, &image);
+                    let bytes = [value, 0, 0, 0, 0, 0, 0, 0];
+                    let bytes = &bytes[..entry.field().get(&image).len().min(8)];
+                    if application.write(&entry, bytes, &mut image).is_ok() {
+                        entry.field().set(&mut image, bytes);
+                    }
+                    let has_switched = pdos(&application, &image) != before;
+                    assert!(says_so || !has_switched, "{:X}h:{}", entry.index(), entry.sub());
+                }
+            }
+            let expected = if personality == Personality::Lift { 6 } else { 0 };
+            assert!(switching <= expected, "{personality:?}: {switching}");
+        }
     }
 }

@@ -64,8 +64,8 @@ pub(crate) fn number(fault: &Fault) -> Option<u8> {
 /// values that fit no device.
 pub(crate) fn flag_of(group: Group) -> Flags {
     match group {
-        Group::Calibration => Flags::sensor(0),
         Group::Communication => Flags::system(4),
         Group::Application => Flags::system(5),
+        _ => Flags::sensor(0),
     }
 }

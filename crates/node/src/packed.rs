@@ -30,7 +30,7 @@ impl PackedGroups {
         match group {
             Group::Communication => &self.communication,
             Group::Application => &self.application,
-            Group::Calibration => &self.calibration,
+            _ => &self.calibration,
         }
     }
 
@@ -38,12 +38,12 @@ impl PackedGroups {
         match group {
             Group::Communication => self.communication.as_mut_view(),
             Group::Application => self.application.as_mut_view(),
-            Group::Calibration => self.calibration.as_mut_view(),
+            _ => self.calibration.as_mut_view(),
         }
     }
 
     pub(crate) fn clear(&mut self) {
-        for group in Group::ALL {
+        for group in Group::COMMON {
             self.get_mut(group).clear();
         }
     }
@@ -70,7 +70,7 @@ pub(crate) const fn number_of(group: Group) -> GroupNumber {
     match group {
         Group::Communication => GroupNumber::Two,
         Group::Application => GroupNumber::Three,
-        Group::Calibration => GroupNumber::Four,
+        _ => GroupNumber::Four,
     }
 }
 
@@ -80,8 +80,8 @@ mod tests {
 
     #[test]
     fn every_group_has_a_number_of_its_own() {
-        let [first, second, third] = Group::ALL.map(number_of);
+        let [first, second, third] = Group::COMMON.map(number_of);
         assert!(first != second && second != third && first != third);
-        assert!(Group::ALL.iter().all(|group| number_of(*group) != storage::DeviceRecord::NUMBER));
+        assert!(Group::COMMON.iter().all(|group| number_of(*group) != storage::DeviceRecord::NUMBER));
     }
 }

@@ -81,7 +81,7 @@ fn abort_of<E>(error: &Error<E>) -> Abort {
 }
 
 /// At most one change a group.
-type Changes<'a> = Vec<Change<'a>, { Group::ALL.len() }>;
+type Changes<'a> = Vec<Change<'a>, { Group::COMMON.len() }>;
 
 fn each<'a>(groups: Groups, change: impl Fn(Group) -> Change<'a>) -> Changes<'a> {
     let mut changes = Vec::new();

@@ -39,7 +39,7 @@ impl Stored {
 
     /// Reads all groups. A group that cannot be read counts as not stored, and as a fault.
     pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
-        for group in Group::ALL {
+        for group in Group::COMMON {
             let mut is_readable = true;
             self.packed.fill(group, |bytes| {
                 let read = read(group, layout_of(group, layout), view, bytes);

@@ -79,7 +79,7 @@ impl Protocol {
         let application = self.device.application_mut();
         application.configured = application.configured.after(job);
         if let Job::Store(groups) | Job::Restore(groups) = job {
-            for group in Group::ALL.into_iter().filter(|group| groups.contains(*group)) {
+            for group in Group::COMMON.into_iter().filter(|group| groups.contains(*group)) {
                 application.stored.replace(group, done.packed.get(group));
             }
         }

@@ -398,6 +398,15 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::switches_pdos`]($crate::profile::Profile::switches_pdos).
+            #[must_use]
+            pub fn switches_pdos(&self, index: u16) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.switches_pdos(index),)+
+                }
+            }
+
             /// As [`Profile::sends_events`]($crate::profile::Profile::sends_events).
             #[must_use]
             pub fn sends_events(&self, tpdo: u16) -> bool {

@@ -122,6 +122,10 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         self.0.stores(index, sub) || self.1.stores(index, sub)
     }
 
+    fn switches_pdos(&self, index: u16) -> bool {
+        self.0.switches_pdos(index) || self.1.switches_pdos(index)
+    }
+
     fn sends_events(&self, tpdo: u16) -> bool {
         self.0.sends_events(tpdo) || self.1.sends_events(tpdo)
     }

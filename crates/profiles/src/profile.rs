@@ -104,6 +104,11 @@ pub trait Profile: Sized {
         false
     }
 
+    /// Whether a write to this object can switch PDOs on or off, or change the result of [`broadcasts`](Profile::broadcasts).
+    fn switches_pdos(&self, _index: u16) -> bool {
+        false
+    }
+
     /// Whether this TPDO (numbered from 1) sends events (`canopen::Application`).
     fn sends_events(&self, _tpdo: u16) -> bool {
         false

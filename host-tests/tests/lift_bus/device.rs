@@ -13,7 +13,7 @@ use crate::world::World;
 
 /// Sizes that suffice for any of the dictionaries.
 const ROOM: Sizes =
-    Sizes { image: 512, tpdos: 8, rpdos: 8, watches: 4, scanned: 48, services: Services::ALL };
+    Sizes { image: 512, tpdos: 8, rpdos: 8, watches: 4, scanned: 48, servers: 0, services: Services::ALL };
 pub(crate) const TICK: Duration = Duration::from_millis(1);
 
 /// The behaviour of a device apart from CANopen.

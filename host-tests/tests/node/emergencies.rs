@@ -177,7 +177,7 @@ fn store(bench: &mut Bench, group: Group, value: u8) {
             bench.write(0x4000, 1, &[value, 0, 0, 0]).unwrap();
             (0x1010, 3)
         }
-        Group::Calibration => {
+        _ => {
             bench.write(0x2203, 0, b"cali").unwrap();
             bench.write(0x2202, 1, &[value, 0, 0, 0]).unwrap();
             (0x2204, 0)

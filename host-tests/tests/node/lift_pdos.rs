@@ -16,7 +16,7 @@ const ID: u8 = 33;
 const ROWS: usize = 24;
 const SIZE: usize = 128;
 /// A device with one PDO, or with one object in a multiplexed PDO.
-type Node = canopen::device!((), room: Sizes { image: SIZE, tpdos: 1, rpdos: 1, watches: 0, scanned: 8, services: Services::ALL });
+type Node = canopen::device!((), room: Sizes { image: SIZE, tpdos: 1, rpdos: 1, watches: 0, scanned: 8, servers: 0, services: Services::ALL });
 
 /// The objects of a PDO; for a multiplexed PDO the one that it carries in these tests.
 fn carried(pdo: &Pdo) -> Vec<(u16, u8, u8)> {

@@ -123,6 +123,7 @@ fn saved(group: Option<Group>) -> &'static str {
         Some(Group::Communication) => "communication",
         Some(Group::Application) => "application",
         Some(Group::Calibration) => "calibration",
+        Some(_) => "product",
     }
 }
 

@@ -84,7 +84,7 @@ impl Entry {
         let group = match row.group {
             Some(Group::Communication) => Some(COMMUNICATION),
             Some(Group::Application) => Some(APPLICATION),
-            Some(Group::Calibration) | None => None,
+            _ => None,
         };
         let size = usize::from(row.kind.size());
         let initial = match row.default {

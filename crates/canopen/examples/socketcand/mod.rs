@@ -1,5 +1,9 @@
 //! The smallest client of a socketcand server (<https://github.com/linux-can/socketcand>): frames as text over TCP.
 
+mod run;
+
+pub(crate) use run::{Product, run};
+
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;

@@ -3,7 +3,7 @@
 use super::{Soundness, Stored};
 use crate::NodeId;
 use crate::dictionary::{Entry, Group, Groups};
-use crate::emcy::{Condition, ErrorClass, Fault};
+use crate::emcy::{Condition, ErrorClass, Fault, Message};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Part};
 use crate::time_stamp::TimeOfDay;
@@ -29,6 +29,11 @@ pub trait Application {
     /// Whether clients may download in blocks (CiA 301, 7.2.4.3.9, optional). Otherwise the request is refused with
     /// [`Abort::Command`], and the client downloads in segments.
     const BLOCK_DOWNLOAD: bool = true;
+
+    /// Whether the application uploads domains in parts ([`begin_upload`](Application::begin_upload)) and learns of a
+    /// download that ends before it is complete ([`download_aborted`](Application::download_aborted)). Without it, the
+    /// content of a domain is one slice ([`read_domain`](Application::read_domain)).
+    const DOMAIN_PARTS: bool = false;
 
     /// Whether SDO requests of less than eight bytes are taken, as if zeros followed. CiA 301, 7.2.4.3, demands eight
     /// bytes, but some older controllers send less. Otherwise such a request is ignored.
@@ -99,6 +104,9 @@ pub trait Application {
     /// A node whose heartbeat is monitored (1016h) is in another state than before, or boots up
     /// ([`State::Initialising`]). A heartbeat that is missing is a [`fault`](Application::fault).
     fn node_state(&mut self, _node: NodeId, _state: State, _image: &mut [u8]) {}
+
+    /// A node that is consumed (1028h) has sent an EMCY; code 0 when none of its faults is left.
+    fn emergency(&mut self, _node: NodeId, _message: Message, _image: &mut [u8]) {}
 
     /// A fault has occurred (`active`) or is over.
     fn fault(&mut self, _fault: Fault, _active: bool, _image: &mut [u8]) {}
@@ -187,6 +195,36 @@ pub trait Application {
     fn read_domain(&self, _at: Multiplexer) -> Result<&[u8], Abort> {
         Err(Abort::Access)
     }
+
+    /// An SDO client begins to read a domain. Returns the number of bytes; the parts follow
+    /// ([`upload_part`](Application::upload_part)), then the end ([`end_upload`](Application::end_upload)). `None` for a
+    /// domain that [`read_domain`](Application::read_domain) gives as a whole.
+    ///
+    /// With a second SDO server, two clients can read the same domain at the same time: an application that cannot serve
+    /// both refuses with [`Abort::DeviceState`].
+    ///
+    /// # Errors
+    /// The reason why the domain cannot be read.
+    fn begin_upload(&mut self, _at: Multiplexer) -> Result<Option<usize>, Abort> {
+        Ok(None)
+    }
+
+    /// Fills `part` with the content of the domain from `offset` on. A client that has lost a block asks for it again, so
+    /// the offset can go back by up to 889 bytes.
+    ///
+    /// # Errors
+    /// The reason to abort the upload.
+    fn upload_part(&mut self, _at: Multiplexer, _offset: usize, _part: &mut [u8]) -> Result<(), Abort> {
+        Err(Abort::Access)
+    }
+
+    /// The upload that [`begin_upload`](Application::begin_upload) has begun is over: complete, or aborted by either
+    /// side, by a time-out, by a new transfer of the client, or by the NMT state.
+    fn end_upload(&mut self, _at: Multiplexer, _is_complete: bool) {}
+
+    /// A download whose [`Part::Begin`] was accepted is over without an accepted [`Part::End`], for one of the reasons of
+    /// [`end_upload`](Application::end_upload). Called with [`DOMAIN_PARTS`](Application::DOMAIN_PARTS) only.
+    fn download_aborted(&mut self, _at: Multiplexer) {}
 
     /// A download to a DOMAIN entry. The parts arrive in order, from [`Part::Begin`] to [`Part::End`]. A download that
     /// is aborted has no [`Part::End`].

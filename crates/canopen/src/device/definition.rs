@@ -1,17 +1,19 @@
 //! What a device is made of: its application, the room for its objects, and its services.
 
 use super::Application;
+use super::inner::Inner;
 use crate::array::Array;
 use crate::dictionary::Services;
 use crate::heartbeat::Monitored;
 use crate::pdo::{Rpdo, Tpdo, Watched};
+use crate::sdo::Channel;
 use core::marker::PhantomData;
 
 /// The definition of a [`Device`](super::Device): [`device!`](crate::device!) and
 /// [`service_device!`](crate::service_device!) make one from the rows of a table.
 ///
 /// The compiler removes the code of every service that a definition lacks.
-pub trait Definition {
+pub trait Definition: Sized {
     /// The application code of the product.
     type Application: Application;
     /// The memory of all values.
@@ -24,6 +26,8 @@ pub trait Definition {
     type Heartbeats: Array<Monitored>;
     #[doc(hidden)]
     type Scanned: Array<Watched>;
+    #[doc(hidden)]
+    type Servers: Array<Channel<Inner<Self>>>;
     /// The services of the device.
     const SERVICES: Services;
 }
@@ -38,6 +42,7 @@ pub struct Rows<
     const RPDOS: usize,
     const HEARTBEATS: usize,
     const SCANNED: usize,
+    const SERVERS: usize,
     const SERVICES: u32,
 >(PhantomData<A>);
 
@@ -48,8 +53,9 @@ impl<
     const RPDOS: usize,
     const HEARTBEATS: usize,
     const SCANNED: usize,
+    const SERVERS: usize,
     const SERVICES: u32,
-> Definition for Rows<A, IMAGE, TPDOS, RPDOS, HEARTBEATS, SCANNED, SERVICES>
+> Definition for Rows<A, IMAGE, TPDOS, RPDOS, HEARTBEATS, SCANNED, SERVERS, SERVICES>
 {
     type Application = A;
     type Image = [u8; IMAGE];
@@ -57,9 +63,11 @@ impl<
     type Rpdos = [Rpdo; RPDOS];
     type Heartbeats = [Monitored; HEARTBEATS];
     type Scanned = [Watched; SCANNED];
+    type Servers = [Channel<Inner<Self>>; SERVERS];
     const SERVICES: Services = Services::from_bits(SERVICES)
         .with_if(TPDOS > 0, Services::TPDO)
         .with_if(RPDOS > 0, Services::RPDO)
         .with_if(HEARTBEATS > 0, Services::HEARTBEAT_CONSUMER)
-        .with_if(SCANNED > 0, Services::MULTIPLEXED_TPDO);
+        .with_if(SCANNED > 0, Services::MULTIPLEXED_TPDO)
+        .with_if(SERVERS > 0, Services::SDO_SERVERS);
 }

@@ -4,7 +4,7 @@ use super::Definition;
 use super::inner::Inner;
 use super::{Application, STALE};
 use crate::pdo::{Chain, ProcessContext};
-use crate::{Instant, Transmit};
+use crate::{Tick, Transmit};
 
 impl<D: Definition> Inner<D> {
     /// The TPDO at this place can be sent from now on.
@@ -18,16 +18,16 @@ impl<D: Definition> Inner<D> {
 
     /// Sends the waiting events of the application as far as they may be sent. Returns when to call again.
     #[inline]
-    pub(super) fn send_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Instant {
-        if self.sends_events && self.state.has_pdos() { self.ask_for_events(context) } else { Instant::NEVER }
+    pub(super) fn send_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Tick {
+        if self.sends_events && self.state.has_pdos() { self.ask_for_events(context) } else { Tick::NEVER }
     }
 
     #[inline(never)]
-    fn ask_for_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Instant {
-        let mut due = Instant::NEVER;
+    fn ask_for_events(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Tick {
+        let mut due = Tick::NEVER;
         for place in 0..self.tpdos.as_ref().len() {
             while self.send_event(place, context) {}
-            due = due.min(self.tpdos.as_ref().get(place).map_or(Instant::NEVER, crate::pdo::Tpdo::event_due));
+            due = due.min(self.tpdos.as_ref().get(place).map_or(Tick::NEVER, crate::pdo::Tpdo::event_due));
         }
         due
     }

@@ -3,10 +3,10 @@
 use super::Definition;
 use super::inner::Inner;
 use super::{Application, Device, Next, STALE};
-use crate::Instant;
 use crate::dictionary::Services;
 use crate::emcy::{ErrorClass, Fault};
 use crate::nmt::State;
+use crate::{Instant, Tick};
 
 /// Error behaviour.
 const ERROR_BEHAVIOUR: u16 = 0x1029;
@@ -36,6 +36,7 @@ impl<D: Definition> Device<D> {
     /// communication error. A warning has no emergency code, because the node still works; a worse state is reported as
     /// error passive.
     pub fn on_bus(&mut self, event: BusEvent, now: Instant) -> Next {
+        let now = self.tick(now);
         let inner = &mut self.inner;
         match event {
             BusEvent::Warning => (),
@@ -53,6 +54,7 @@ impl<D: Definition> Device<D> {
     /// Sets or clears a fault of the application, by its number in [`Application::CONDITIONS`]. A fault is signalled
     /// once, until it is cleared.
     pub fn set_condition(&mut self, number: u8, active: bool, now: Instant) -> Next {
+        let now = self.tick(now);
         self.inner.set_fault(Fault::Application(number), active, now);
         self.process_next()
     }
@@ -92,7 +94,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// After a reset: reports the faults that are still active, and the groups that could not be loaded.
-    pub(super) fn configure_faults(&mut self, now: Instant) {
+    pub(super) fn configure_faults(&mut self, now: Tick) {
         if Self::has(Services::EMCY) {
             let application = &self.application;
             self.emcy.restart(|number| application.fault_detail(number), now);
@@ -104,7 +106,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// EMCY has been switched on: reports the active faults. Messages that have waited are older.
-    pub(super) fn report_active(&mut self, now: Instant) {
+    pub(super) fn report_active(&mut self, now: Tick) {
         self.emcy.forget_waiting();
         let application = &self.application;
         self.emcy.repeat_singles(|number| application.fault_detail(number), now);
@@ -118,7 +120,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Reports bus-off after the recovery: during bus-off, the node cannot send.
-    fn recover(&mut self, now: Instant) {
+    fn recover(&mut self, now: Tick) {
         if core::mem::take(&mut self.is_bus_off) {
             self.raise(Fault::BusOffRecovered, now);
         }
@@ -128,14 +130,14 @@ impl<D: Definition> Inner<D> {
 
     /// Reports a fault that is over immediately.
     #[inline(never)]
-    pub(super) fn report(&mut self, fault: Fault, now: Instant) {
+    pub(super) fn report(&mut self, fault: Fault, now: Tick) {
         self.raise(fault, now);
         self.clear(fault, now);
     }
 
     // Not inlined: many callers, none of them time-critical.
     #[inline(never)]
-    pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
+    pub(super) fn raise(&mut self, fault: Fault, now: Tick) {
         let is_new = if Self::has(Services::EMCY) {
             let detail = match fault {
                 Fault::Application(number) => self.application.fault_detail(number),
@@ -151,7 +153,7 @@ impl<D: Definition> Inner<D> {
     }
 
     #[inline(never)]
-    pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
+    pub(super) fn clear(&mut self, fault: Fault, now: Tick) {
         let was_active = if Self::has(Services::EMCY) {
             self.emcy.clear(fault, now)
         } else {
@@ -162,7 +164,7 @@ impl<D: Definition> Inner<D> {
         }
     }
 
-    pub(super) fn set_fault(&mut self, fault: Fault, active: bool, now: Instant) {
+    pub(super) fn set_fault(&mut self, fault: Fault, active: bool, now: Tick) {
         if active { self.raise(fault, now) } else { self.clear(fault, now) }
     }
 

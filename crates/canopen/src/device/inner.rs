@@ -7,60 +7,54 @@ use super::{Action, Application, Definition, STALE, store};
 use crate::array::Array;
 use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
 use crate::emcy::Fault;
-use crate::lss::Identity;
 use crate::nmt::State;
 use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
 use crate::transmit::Context;
-use crate::{CanId, Instant, NodeId, Transmit, emcy, heartbeat, sync, time_stamp};
-
-/// Identity object.
-const IDENTITY: u16 = 0x1018;
+use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_stamp};
 
 /// A device without its SDO server and its LSS slave, which act on it.
-pub(super) struct Inner<D: Definition> {
-    pub(super) dictionary: &'static Dictionary,
+// In this order, a short instruction reaches most fields: bytes and words come first, arrays last.
+#[repr(C)]
+pub struct Inner<D: Definition> {
+    pub(super) state: State,
     /// `None` for a device that waits for a node-ID from LSS.
     pub(super) node_id: Option<NodeId>,
-    pub(super) state: State,
-    /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
-    pub(super) process_due: Instant,
-    pub(super) services_due: Instant,
-    pub(super) heartbeat: heartbeat::Producer,
-    pub(super) guarding: heartbeat::Guarding,
-    pub(super) pending: Pending,
-    pub(super) application: D::Application,
-    pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
-    pub(super) sync: sync::Consumer,
-    pub(super) sync_producer: sync::Producer,
-    pub(super) time_stamp: time_stamp::Service,
-    pub(super) emcy: emcy::Producer,
-    pub(super) tpdos: D::Tpdos,
-    pub(super) rpdos: D::Rpdos,
-    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
-    /// in the set and need no further check.
-    pub(super) rpdo_filter: u32,
-    pub(super) scanner: Scanner<D::Scanned>,
-    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
-    pub(super) all_nodes: Option<(CanId, u16)>,
+    pub(super) is_bus_off: bool,
     /// Whether any TPDO sends events.
     pub(super) sends_events: bool,
-    /// The first PDOs of the chains.
-    pub(super) first_tpdos: Links,
-    pub(super) first_rpdos: Links,
-    pub(super) jobs: store::Jobs,
     /// The groups whose stored values could not be loaded: the defaults are in use.
     pub(super) lost: Groups,
     /// The groups whose newest stored values could not be loaded: the values of the save before are in use.
     pub(super) older: Groups,
-    pub(super) is_bus_off: bool,
+    pub(super) pending: Pending,
+    pub(super) jobs: store::Jobs,
+    pub(super) dictionary: &'static Dictionary,
+    /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
+    pub(super) process_due: Tick,
+    pub(super) services_due: Tick,
+    /// The first PDOs of the chains.
+    pub(super) first_tpdos: Links,
+    pub(super) first_rpdos: Links,
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits. Most frames for other nodes are not
+    /// in the set and need no further check.
+    pub(super) rpdo_filter: u32,
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
+    pub(super) all_nodes: Option<(CanId, u16)>,
+    pub(super) heartbeat: heartbeat::Producer,
+    pub(super) sync: sync::Consumer,
+    pub(super) sync_producer: sync::Producer,
+    pub(super) time_stamp: time_stamp::Service,
+    pub(super) guarding: heartbeat::Guarding,
+    pub(super) emcy: emcy::Producer,
+    pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
+    pub(super) application: D::Application,
+    pub(super) tpdos: D::Tpdos,
+    pub(super) rpdos: D::Rpdos,
+    pub(super) scanner: Scanner<D::Scanned>,
     pub(super) image: D::Image,
 }
 
 impl<D: Definition> Inner<D> {
-    /// Free places in the transmit queue that a block upload leaves: for a heartbeat and an LSS response, and beside
-    /// process data for all PDOs of a SYNC, a heartbeat and an EMCY.
-    pub(super) const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
-
     /// A device that has not started.
     pub(super) fn new(
         dictionary: &'static Dictionary,
@@ -72,8 +66,8 @@ impl<D: Definition> Inner<D> {
             dictionary,
             node_id,
             state: State::Initialising,
-            process_due: Instant::NEVER,
-            services_due: Instant::NEVER,
+            process_due: Tick::NEVER,
+            services_due: Tick::NEVER,
             heartbeat: heartbeat::Producer::new(),
             guarding: heartbeat::Guarding::new(),
             pending: Pending::new(),
@@ -99,6 +93,33 @@ impl<D: Definition> Inner<D> {
         }
     }
 
+    /// The epoch of the clock has moved.
+    pub(super) fn shift(&mut self, by: Span) {
+        self.process_due.shift(by);
+        self.services_due.shift(by);
+        self.heartbeat.shift(by);
+        if Self::has(Services::GUARDING) {
+            self.guarding.shift(by);
+        }
+        if Self::has(Services::HEARTBEAT_CONSUMER) {
+            self.watches.shift(by);
+        }
+        if Self::has(Services::SYNC) {
+            self.sync.shift(by);
+        }
+        if Self::has(Services::SYNC_PRODUCER) {
+            self.sync_producer.shift(by);
+        }
+        if Self::has(Services::EMCY) {
+            self.emcy.shift(by);
+        }
+        self.tpdos.as_mut().iter_mut().for_each(|tpdo| tpdo.shift(by));
+        self.rpdos.as_mut().iter_mut().for_each(|rpdo| rpdo.shift(by));
+        if Self::has(Services::MULTIPLEXED_TPDO) {
+            self.scanner.shift(by);
+        }
+    }
+
     /// Whether the device has a service. The compiler removes the code of any other.
     pub(super) const fn has(service: Services) -> bool {
         D::SERVICES.contains(service)
@@ -120,7 +141,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Makes the services due at this instant, or earlier.
-    pub(super) fn serve_until(&mut self, due: Instant) {
+    pub(super) fn serve_until(&mut self, due: Tick) {
         self.services_due = self.services_due.min(due);
     }
 
@@ -146,15 +167,6 @@ impl<D: Definition> Inner<D> {
 
     pub(super) fn word(&self, field: Field) -> u32 {
         little_endian(field.get(self.image.as_ref()))
-    }
-
-    pub(super) fn identity(&self) -> Identity {
-        Identity {
-            vendor: self.number(IDENTITY, 1),
-            product: self.number(IDENTITY, 2),
-            revision: self.number(IDENTITY, 3),
-            serial: self.number(IDENTITY, 4),
-        }
     }
 
     /// Changes the NMT state.
@@ -205,11 +217,14 @@ impl<D: Definition> Inner<D> {
         if everything {
             self.load_stored(Group::Application);
             self.load_stored(Group::Calibration);
+            if Self::has(Services::OWN_GROUPS) {
+                Group::OWN.into_iter().for_each(|group| self.load_stored(group));
+            }
         }
     }
 
     /// Hands all protocols their parameters from the dictionary.
-    pub(super) fn configure(&mut self, now: Instant) {
+    pub(super) fn configure(&mut self, now: Tick) {
         if Self::has(Services::SYNC) {
             self.configure_sync(now);
         }
@@ -266,9 +281,9 @@ impl<D: Definition> Inner<D> {
     }
 
     /// The next deadline of `poll_errors`.
-    pub(super) fn errors_due(&self) -> Instant {
+    pub(super) fn errors_due(&self) -> Tick {
         let is_sent = Self::has(Services::EMCY) && self.state.has_services();
-        let emcy = if is_sent { self.emcy.due() } else { Instant::NEVER };
+        let emcy = if is_sent { self.emcy.due() } else { Tick::NEVER };
         let due = if Self::has(Services::GUARDING) { emcy.min(self.guarding.due()) } else { emcy };
         if Self::has(Services::HEARTBEAT_CONSUMER) { due.min(self.watches.due()) } else { due }
     }

@@ -2,9 +2,12 @@
 
 use super::inner::Inner;
 use super::{Action, Definition, STALE};
-use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
+use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Slave, Switch, frame_of_word};
 use crate::transmit::{Context, RETRY};
-use crate::{Frame, Instant, NodeId, Transmit};
+use crate::{Frame, NodeId, Span, Tick, Transmit};
+
+/// Identity object: its sub-indexes 1 to 4 are the parts of the identity.
+const IDENTITY: u16 = 0x1018;
 
 /// A change of the bit rate (CiA 305, activate bit timing parameters).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,10 +25,10 @@ pub(super) struct LssSlave {
     slave: Slave,
     reply: [u8; 8],
     /// When to send the response again that found the queue full.
-    reply_due: Instant,
+    reply_due: Tick,
     switching: Switching,
     /// When the present delay is over.
-    switching_due: Instant,
+    switching_due: Tick,
 }
 
 impl LssSlave {
@@ -33,10 +36,16 @@ impl LssSlave {
         LssSlave {
             slave: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
             reply: [0; 8],
-            reply_due: Instant::NEVER,
+            reply_due: Tick::NEVER,
             switching: Switching::No,
-            switching_due: Instant::NEVER,
+            switching_due: Tick::NEVER,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.reply_due.shift(by);
+        self.switching_due.shift(by);
     }
 
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
@@ -69,11 +78,11 @@ impl LssSlave {
         context: &mut Context<'_, impl Transmit>,
         inner: &mut Inner<impl Definition>,
     ) {
-        let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
-        let identity = inner.identity();
-        let response = match self.slave.take(request, &identity, inner.node_id) {
+        let Some(request) = frame.full(REQUEST).copied() else { return };
+        let identity = |part| inner.number(IDENTITY, part + 1);
+        let response = match self.slave.take(request, identity, inner.node_id) {
             Outcome::Silence => None,
-            Outcome::Answer(response) => Some(response),
+            Outcome::Answer(command, value) => Some((command, value)),
             Outcome::BootUp => {
                 inner.request_boot_up();
                 None
@@ -93,16 +102,16 @@ impl LssSlave {
         inner.services_due = STALE;
     }
 
-    /// Sends a response. It replaces a response that still waits: the master no longer expects the older one.
-    pub(super) fn respond(&mut self, response: Response, context: &mut Context<'_, impl Transmit>) {
-        self.reply = response.encode();
+    /// Sends a response, given as command specifier and value. It replaces a response that still waits: the master no longer expects the older one.
+    pub(super) fn respond(&mut self, (command, value): (u8, u32), context: &mut Context<'_, impl Transmit>) {
+        self.reply = frame_of_word(command, value);
         self.send(context);
     }
 
     #[inline(never)]
     fn send(&mut self, context: &mut Context<'_, impl Transmit>) {
         let is_sent = context.send(Frame::data_frame(RESPONSE, 8, self.reply));
-        self.reply_due = if is_sent { Instant::NEVER } else { context.now.plus(RETRY) };
+        self.reply_due = if is_sent { Tick::NEVER } else { context.now.plus(RETRY) };
     }
 
     /// Sends the response again that found the queue full.
@@ -116,14 +125,14 @@ impl LssSlave {
     /// Returns the new bit rate when the bus changes to it.
     pub(super) fn poll_switching(
         &mut self,
-        now: Instant,
+        now: Tick,
         inner: &mut Inner<impl Definition>,
     ) -> Option<BitRate> {
         if now < self.switching_due {
             return None;
         }
         let Switching::Before(switch) = self.switching else {
-            (self.switching, self.switching_due) = (Switching::No, Instant::NEVER);
+            (self.switching, self.switching_due) = (Switching::No, Tick::NEVER);
             return None;
         };
         inner.ask(Action::BitRate(switch.bit_rate));
@@ -132,7 +141,7 @@ impl LssSlave {
     }
 
     /// The next deadline of `poll` or `poll_switching`.
-    pub(super) fn due(&self) -> Instant {
+    pub(super) fn due(&self) -> Tick {
         self.switching_due.min(self.reply_due)
     }
 }

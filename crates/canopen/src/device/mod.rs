@@ -11,10 +11,12 @@
 
 mod application;
 mod definition;
+mod emergencies;
 mod events;
 mod faults;
 mod inner;
 mod lss;
+mod more_sdo;
 mod multiplexed;
 mod next;
 mod objects;
@@ -37,7 +39,8 @@ pub use store::{Job, Soundness, Stored};
 use crate::dictionary::Dictionary;
 use crate::lss::BitRate;
 use crate::nmt::State;
-use crate::{Instant, NodeId};
+use crate::time::Clock;
+use crate::{Instant, NodeId, Tick};
 use inner::Inner;
 use services::Services;
 
@@ -45,6 +48,7 @@ use services::Services;
 /// do not work.
 #[repr(C)] // The services are short. At the start of the structure, an instruction reaches their fields directly.
 pub struct Device<D: Definition> {
+    clock: Clock,
     services: Services<D>,
     inner: Inner<D>,
 }
@@ -60,10 +64,10 @@ impl<D: Definition> core::fmt::Debug for Device<D> {
 ///
 /// [`service_device!`](crate::service_device!) gives the type for a table of rows. Rows of other services hold values
 /// without any effect.
-pub type ServiceDevice<A, const N: usize> = Device<Rows<A, N, 0, 0, 0, 0, 0>>;
+pub type ServiceDevice<A, const N: usize> = Device<Rows<A, N, 0, 0, 0, 0, 0, 0>>;
 
 /// A deadline in the past: the next poll checks everything.
-const STALE: Instant = Instant(0);
+const STALE: Tick = Tick(0);
 
 impl<D: Definition> Device<D> {
     /// A device that has not started: it neither sends nor receives until [`start`](Device::start). The bit rate is only
@@ -74,7 +78,11 @@ impl<D: Definition> Device<D> {
         application: D::Application,
     ) -> Device<D> {
         let node_id = node_id.into();
-        Device { services: Services::new(node_id), inner: Inner::new(dictionary, node_id, application) }
+        Device {
+            services: Services::new(node_id),
+            inner: Inner::new(dictionary, node_id, application),
+            clock: Clock::new(),
+        }
     }
 
     /// Sets the configured bit rate. LSS stores it together with a new node-ID.
@@ -89,6 +97,29 @@ impl<D: Definition> Device<D> {
     /// the bit rate sets it here.
     pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
         self.services.set_bus_bit_rate(bit_rate);
+    }
+
+    /// The present inside the device.
+    // Not inlined: many callers.
+    #[inline(never)]
+    fn tick(&mut self, now: Instant) -> Tick {
+        self.tick_of_frame(now)
+    }
+
+    /// As [`tick`](Device::tick), for the calls that hand over a frame.
+    #[inline]
+    fn tick_of_frame(&mut self, now: Instant) -> Tick {
+        self.clock.tick(now).unwrap_or_else(|| self.follow(now))
+    }
+
+    /// Moves the epoch of the clock, and all ticks with it.
+    #[cold]
+    #[inline(never)]
+    fn follow(&mut self, now: Instant) -> Tick {
+        let (now, by) = self.clock.follow(now);
+        self.services.shift(by);
+        self.inner.shift(by);
+        now
     }
 
     /// The node-ID in use.

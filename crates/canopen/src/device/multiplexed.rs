@@ -7,7 +7,7 @@ use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
-use crate::{Frame, Instant, NodeId};
+use crate::{Frame, NodeId, Tick};
 
 /// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
 const SCANNER_LIST: u16 = 0x1FA0;
@@ -80,7 +80,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Takes a received multiplexed PDO. `addressing` is the mode of the RPDO; a frame of the other mode is ignored.
-    pub(super) fn on_mpdo(&mut self, frame: [u8; 8], addressing: Addressing, now: Instant) {
+    pub(super) fn on_mpdo(&mut self, frame: [u8; 8], addressing: Addressing, now: Tick) {
         let Some(mpdo) = Mpdo::parse(frame) else { return };
         match (mpdo.address, addressing) {
             (Address::Destination(node), Addressing::Destination)
@@ -95,7 +95,7 @@ impl<D: Definition> Inner<D> {
 
     /// Takes an object for this node or for all nodes. An object that is missing or rejects the value is an error only
     /// if this node alone is addressed.
-    fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Instant) {
+    fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Tick) {
         let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
         if !is_taken && node.is_some() {
             self.report(Fault::MpdoNotTaken, now);

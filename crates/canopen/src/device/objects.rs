@@ -4,15 +4,18 @@ use super::Definition;
 use super::inner::Inner;
 use super::pdos::low_half;
 use super::state::SELF_START;
-use super::store::{check_program_control, command};
+use super::store::check_program_control;
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
-use crate::{Instant, emcy, sync, time_stamp};
+use crate::{CobId, Tick, sync, time_stamp};
 
 impl<D: Definition> Objects for Inner<D> {
     const BLOCK_UPLOAD: bool = D::Application::BLOCK_UPLOAD;
     const BLOCK_DOWNLOAD: bool = D::Application::BLOCK_DOWNLOAD;
+    const PARTS: bool = D::Application::DOMAIN_PARTS;
+    /// For a heartbeat and an LSS response, and beside process data for all PDOs of a SYNC, a heartbeat and an EMCY.
+    const RESERVED_ROOM: usize = if Self::has(Services::FAULTS) { 10 } else { 2 };
 
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
@@ -38,7 +41,7 @@ impl<D: Definition> Objects for Inner<D> {
         Ok(if entry.is_domain() { Writable::Stream } else { Writable::Value(entry.field.size.into()) })
     }
 
-    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Tick) -> Result<(), Abort> {
         let found = self.dictionary.find(at.index, at.sub);
         // By reference: a move out of the result takes a dozen instructions.
         let entry = found.as_ref().map_err(|abort| *abort)?;
@@ -72,18 +75,43 @@ impl<D: Definition> Objects for Inner<D> {
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         self.application.write_domain(at, part)
     }
+
+    fn abandon(&mut self, at: Multiplexer) {
+        self.application.download_aborted(at);
+    }
+
+    fn open(&mut self, at: Multiplexer) -> Result<Option<usize>, Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if !entry.attributes.access.is_readable() {
+            return Err(Abort::WriteOnly);
+        }
+        if entry.is_domain() { self.application.begin_upload(at) } else { Ok(None) }
+    }
+
+    fn part(&mut self, at: Multiplexer, offset: usize, part: &mut [u8]) -> Result<(), Abort> {
+        self.application.upload_part(at, offset, part)
+    }
+
+    fn close(&mut self, at: Multiplexer, is_complete: bool) {
+        self.application.end_upload(at, is_complete);
+    }
 }
 
 impl<D: Definition> Inner<D> {
     /// Writes a domain whose download arrived in one piece.
     fn write_domain(&mut self, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
-        self.application.write_domain(at, Part::Begin(Some(bytes.len())))?;
-        self.application.write_domain(at, Part::Data(0, bytes))?;
-        self.application.write_domain(at, Part::End(bytes.len()))
+        let application = &mut self.application;
+        application.write_domain(at, Part::Begin(Some(bytes.len())))?;
+        let data = application.write_domain(at, Part::Data(0, bytes));
+        let result = data.and_then(|()| application.write_domain(at, Part::End(bytes.len())));
+        if D::Application::DOMAIN_PARTS && result.is_err() {
+            application.download_aborted(at);
+        }
+        result
     }
 
     /// Writes an entry whose values the application accepts or refuses.
-    fn write_handled(&mut self, entry: &Entry, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+    fn write_handled(&mut self, entry: &Entry, bytes: &[u8], now: Tick) -> Result<(), Abort> {
         self.application.write(entry, bytes, self.image.as_mut())?;
         entry.field.set(self.image.as_mut(), bytes);
         self.pending.parameters_changed();
@@ -97,7 +125,7 @@ impl<D: Definition> Inner<D> {
     /// Writes an entry whose rule does more than storing a value: everything that can refuse the value comes before
     /// any effect.
     #[inline(never)]
-    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Tick) -> Result<(), Abort> {
         let rule = entry.rule();
         self.check(entry, value)?;
         if !rule.is_computed() && !rule.is_command() {
@@ -137,7 +165,16 @@ impl<D: Definition> Inner<D> {
             Rule::SyncOverflow if Self::has(Services::SYNC) => {
                 sync::check_overflow(value, self.number(0x1006, 0))
             }
-            Rule::EmcyCobId if Self::has(Services::EMCY) => emcy::check_cob_id(self.word(entry.field), value),
+            Rule::EmcyCobId if Self::has(Services::EMCY) => {
+                CobId::check_change(self.word(entry.field), value)
+            }
+            Rule::EmcyWatch if Self::has(Services::EMCY_CONSUMER) => {
+                CobId::check_change(self.word(entry.field), value)
+            }
+            Rule::SdoServerCobId if Self::has(Services::SDO_SERVERS) => {
+                CobId::check_change(self.word(entry.field), value)
+            }
+            Rule::SdoClientCobId if Self::has(Services::SDO_CLIENT) => self.check_client(entry, value),
             Rule::StartUp if Self::has(Services::SELF_START) => {
                 if matches!(value, 0 | SELF_START) {
                     Ok(())
@@ -149,7 +186,7 @@ impl<D: Definition> Inner<D> {
             Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting
                 if Self::has(Services::STORE) =>
             {
-                self.check_job(command(entry, value)?)
+                self.check_job(self.command(entry, value)?)
             }
             rule if rule.is_command() => Err(Abort::NotStored),
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => self.check_watch(entry, value),
@@ -169,7 +206,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Hands a new value to the protocol that uses it, or carries out a command.
-    fn apply(&mut self, entry: &Entry, value: u32, now: Instant) {
+    fn apply(&mut self, entry: &Entry, value: u32, now: Tick) {
         match entry.rule() {
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),
@@ -195,7 +232,7 @@ impl<D: Definition> Inner<D> {
                 if Self::has(Services::STORE) =>
             {
                 // `check` has made sure that the job can begin.
-                let _ = command(entry, value).and_then(|job| self.begin_deferred(job));
+                let _ = self.command(entry, value).and_then(|job| self.begin_deferred(job));
             }
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => {
                 self.configure_watch(entry.sub(), now);
@@ -222,6 +259,9 @@ impl<D: Definition> Inner<D> {
                 | Rule::PdoCobId
                 | Rule::PdoPredefined
                 | Rule::HeartbeatWatch
+                | Rule::EmcyWatch
+                | Rule::SdoServerCobId
+                | Rule::SdoClientCobId
         ) && Self::has(Services::FAULTS)
         {
             self.pending.identifiers_changed();

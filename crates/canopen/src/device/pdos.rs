@@ -8,13 +8,13 @@ use super::Application;
 use super::Definition;
 use super::inner::Inner;
 use super::rpdos::filter_bit;
-use crate::dictionary::{Dictionary, Direction, Entry, Rule, Services};
+use crate::dictionary::{Direction, Entry, Rule, Services};
 use crate::pdo::{
     Addressing, Chain, Content, Layout, Links, MappedObject, RpdoSettings, ScannerSettings, Settings,
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CobId, Instant};
+use crate::{CobId, Tick};
 
 /// A PDO of the dictionary, by the index of its communication object.
 ///
@@ -46,27 +46,43 @@ impl Pdo {
     fn direction(self) -> Direction {
         if self.communication & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive }
     }
-
-    /// The PDOs of a dictionary in one direction, by ascending number.
-    fn all(dictionary: &'static Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
-        let communication = (0..).map_while(move |place| dictionary.pdo(direction, place));
-        communication.map(|communication| Pdo { communication })
-    }
 }
 
 impl<D: Definition> Inner<D> {
+    /// The PDO at a place; `None` beyond the last one.
+    fn pdo_at(&self, direction: Direction, place: u16) -> Option<Pdo> {
+        self.dictionary.pdo(direction, place).map(|communication| Pdo { communication })
+    }
+
+    /// The PDOs in one direction, by place.
+    fn pdos(&self, direction: Direction) -> impl Iterator<Item = Pdo> {
+        (0..).map_while(move |place| self.pdo_at(direction, place))
+    }
+
     /// Gives every PDO its settings.
-    pub(super) fn configure_pdos(&mut self, now: Instant) {
-        for direction in Self::directions() {
-            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
-                self.configure_one(pdo, place, now);
-            }
-        }
+    pub(super) fn configure_pdos(&mut self, now: Tick) {
+        self.configure_each(now, |_, _, _| true);
         self.link_pdos();
         if Self::has(Services::MULTIPLEXED_TPDO) {
             self.configure_scanner(None);
         }
         self.update_scanner();
+    }
+
+    /// Gives the PDOs that meet a condition their settings. Returns whether there are any.
+    fn configure_each(&mut self, now: Tick, condition: impl Fn(&Self, Pdo, u16) -> bool) -> bool {
+        let mut has_any = false;
+        for direction in Direction::BOTH {
+            let mut place = 0;
+            while let Some(pdo) = self.pdo_at(direction, place) {
+                if condition(self, pdo, place) {
+                    self.configure_one(pdo, place, now);
+                    has_any = true;
+                }
+                place += 1;
+            }
+        }
+        has_any
     }
 
     /// Gives the multiplexed TPDO its settings, if the rows have one.
@@ -77,7 +93,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Gives the PDO to which the entry belongs its settings.
-    pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Instant) {
+    pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Tick) {
         let pdo = Pdo::of(entry);
         if let Some(place) = self.place(pdo) {
             self.configure_one(pdo, place, now);
@@ -87,17 +103,13 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Reconfigures the PDOs that the application has switched on or off.
-    pub(super) fn apply_application_changes(&mut self, now: Instant) {
-        let mut has_changed = false;
-        for direction in Self::directions() {
-            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
-                if self.is_valid(pdo) != self.is_used(pdo, place) {
-                    self.configure_one(pdo, place, now);
-                    has_changed = true;
-                }
-            }
-        }
-        if has_changed {
+    pub(super) fn apply_application_changes(&mut self, now: Tick) {
+        let is_switched = |inner: &Self, pdo, place| {
+            // The settings are costly, and most PDOs have not changed.
+            let is_used = inner.is_used(pdo, place);
+            inner.cob_id(pdo).is_some() != is_used && inner.is_valid(pdo) != is_used
+        };
+        if self.configure_each(now, is_switched) {
             self.link_pdos();
             self.pending.identifiers_changed();
         }
@@ -125,8 +137,10 @@ impl<D: Definition> Inner<D> {
 
     /// The position of a PDO in the array of the device: its rank among the PDOs of the dictionary in this direction.
     fn place(&self, pdo: Pdo) -> Option<u16> {
-        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction()));
-        ranked.find(|(_, other)| other.communication == pdo.communication).map(|(place, _)| place)
+        let is_other = |other: &Pdo| other.communication != pdo.communication;
+        let before = self.pdos(pdo.direction()).take_while(is_other).count();
+        let place = u16::try_from(before).ok()?;
+        self.pdo_at(pdo.direction(), place).map(|_| place)
     }
 
     /// The position of a TPDO by its number, 1 to 512.
@@ -134,7 +148,7 @@ impl<D: Definition> Inner<D> {
         self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
 
-    fn configure_one(&mut self, pdo: Pdo, place: u16, now: Instant) {
+    fn configure_one(&mut self, pdo: Pdo, place: u16, now: Tick) {
         match pdo.direction() {
             Direction::Transmit => self.configure_tpdo(pdo, place),
             Direction::Receive if Self::has(Services::RPDO) => self.configure_rpdo(pdo, place, now),
@@ -153,7 +167,7 @@ impl<D: Definition> Inner<D> {
         }
     }
 
-    fn configure_rpdo(&mut self, pdo: Pdo, place: u16, now: Instant) {
+    fn configure_rpdo(&mut self, pdo: Pdo, place: u16, now: Tick) {
         let settings = self.rpdo_settings(pdo);
         if let Some(rpdo) = self.rpdos.as_mut().get_mut(usize::from(place)) {
             rpdo.configure(settings);
@@ -219,13 +233,15 @@ impl<D: Definition> Inner<D> {
 
     /// Whether every mapping contains mappable objects only. A stored mapping may come from an older dictionary.
     pub(super) fn mappings_are_sound(&self) -> bool {
-        let mut pdos = Self::directions().flat_map(|direction| Pdo::all(self.dictionary, direction));
-        pdos.all(|pdo| self.content(pdo).is_some())
+        Direction::BOTH
+            .into_iter()
+            .flat_map(|direction| self.pdos(direction))
+            .all(|pdo| self.content(pdo).is_some())
     }
 
     /// The settings of the multiplexed TPDO. Only one can exist (CiA 301, 7.2.2.6): the first valid one is used.
     fn scanner_settings(&self) -> Option<ScannerSettings> {
-        Pdo::all(self.dictionary, Direction::Transmit).find_map(|pdo| {
+        self.pdos(Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
             let (cob_id, _) = self.transmission(pdo)?;
             let inhibit = low_half(self.parameter(pdo, 3));
@@ -244,12 +260,6 @@ impl<D: Definition> Inner<D> {
         if is_possible { Addressing::from_count(count) } else { None }
     }
 
-    /// The directions in which the rows have PDOs.
-    fn directions() -> impl Iterator<Item = Direction> {
-        let transmit = (Self::has(Services::TPDO)).then_some(Direction::Transmit);
-        transmit.into_iter().chain((Self::has(Services::RPDO)).then_some(Direction::Receive))
-    }
-
     /// The content that the mapping of a PDO describes; `None` when an entry of the mapping cannot be mapped.
     fn content(&self, pdo: Pdo) -> Option<Content> {
         let count = self.mapped(pdo);
@@ -261,10 +271,12 @@ impl<D: Definition> Inner<D> {
 
     /// Excludes the objects of all TPDOs, valid or not, from the multiplexed TPDO.
     pub(super) fn deselect_mapped(&mut self) {
-        for pdo in Pdo::all(self.dictionary, Direction::Transmit) {
+        let mut place = 0;
+        while let Some(pdo) = self.pdo_at(Direction::Transmit, place) {
             if let Some(Content::Objects(layout)) = self.content(pdo) {
                 self.scanner.deselect(&layout);
             }
+            place += 1;
         }
     }
 

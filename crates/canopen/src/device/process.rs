@@ -2,55 +2,62 @@
 
 use super::Definition;
 use super::inner::Inner;
+use super::rpdos::filter_bit;
 use super::{Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::nmt::Command;
-use crate::pdo::{Chain, ProcessContext, Rpdo, Tpdo};
+use crate::pdo::{Chain, ProcessContext, Tpdo};
 use crate::time_stamp::TimeOfDay;
-use crate::{CanId, Duration, Frame, Instant, Transmit};
+use crate::{CanId, Frame, Instant, Span, Tick, Transmit};
 
 impl<D: Definition> Device<D> {
     /// Takes a frame for either half.
     #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick_of_frame(now);
         if self.is_request(frame) {
-            let _ = self.poll_process(now, out);
-            return self.on_service_frame(frame, now, out);
+            self.send_due_process(now, out);
+            self.take_service_frame(frame, now, out);
+        } else {
+            self.take_process_frame(frame, now, out);
+            self.take_other_service(frame, now, out);
         }
-        self.take_process_frame(frame, now, out);
-        self.take_other_service(frame, now, out);
         self.services_next()
     }
 
     /// Sends all frames that are due, in both halves.
-    #[inline]
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        let _ = self.poll_process(now, out);
-        self.poll_services(now, out)
+        let now = self.tick(now);
+        self.send_due_process(now, out);
+        self.send_due_services(now, out);
+        self.next()
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
     // Inlined, so that a caller that ignores a part of `Next` does not pay for it. The work is in a separate function.
     #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick_of_frame(now);
         self.take_process_frame(frame, now, out);
         self.process_next()
     }
 
     #[inline(never)]
-    fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    fn take_process_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         let is_nmt = frame.id() == CanId::NMT.get();
         if is_nmt {
             self.on_nmt(frame);
         }
-        if !Inner::<D>::has_process() {
+        let is_of_process = !is_nmt && self.inner.is_of_process(frame);
+        if !Inner::<D>::has_process() || !is_of_process && now < self.inner.process_due {
             return;
         }
         if D::SERVICES.contains(Services::TIME) && self.inner.on_time(frame) {
             return;
         }
         let context = &mut self.services.process_context(now, out);
-        if !is_nmt && self.inner.state.has_pdos() {
+        if is_of_process && self.inner.state.has_pdos() {
             self.inner.take_pdo_frame(frame, context);
         }
         self.inner.send_process(context);
@@ -66,11 +73,21 @@ impl<D: Definition> Device<D> {
     /// Sends the process data that is due.
     #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if Inner::<D>::has_process() && now >= self.inner.process_due {
-            let context = &mut self.services.process_context(now, out);
-            self.inner.send_process(context);
-        }
+        let now = self.tick(now);
+        self.send_due_process(now, out);
         self.process_next()
+    }
+
+    #[inline]
+    fn send_due_process(&mut self, now: Tick, out: &mut impl Transmit) {
+        if Inner::<D>::has_process() && now >= self.inner.process_due {
+            self.run_process(now, out);
+        }
+    }
+
+    #[inline(never)]
+    fn run_process(&mut self, now: Tick, out: &mut impl Transmit) {
+        self.inner.run_process(&mut self.services.process_context(now, out));
     }
 
     /// Lets the application update values in the image, and sends the PDOs that their change triggers. If the device
@@ -81,6 +98,7 @@ impl<D: Definition> Device<D> {
         out: &mut impl Transmit,
         update: impl FnOnce(&mut D::Application, &mut [u8]),
     ) -> Next {
+        let now = self.tick(now);
         self.show(update);
         self.send_changes(now, out);
         self.process_next()
@@ -89,6 +107,7 @@ impl<D: Definition> Device<D> {
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
         let context = &mut self.services.process_context(now, out);
         let place = self.inner.tpdo_place(tpdo);
         if self.inner.state.has_pdos()
@@ -103,11 +122,12 @@ impl<D: Definition> Device<D> {
 
     /// Sends the time stamp, if bit 30 of 1012h is set and the NMT state allows it. Returns whether it is sent.
     pub fn send_time(&mut self, time: TimeOfDay, now: Instant, out: &mut impl Transmit) -> bool {
+        let now = self.tick(now);
         let context = &mut self.services.process_context(now, out);
         self.inner.time_frame(time).is_some_and(|frame| context.send(frame))
     }
 
-    fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn send_changes(&mut self, now: Tick, out: &mut impl Transmit) {
         let context = &mut self.services.process_context(now, out);
         self.inner.self_start(context);
         if self.inner.state.has_pdos() {
@@ -124,34 +144,75 @@ impl<D: Definition> Device<D> {
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
     pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
-        let all_nodes = self.inner.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
-        self.own_process_ids().chain(all_nodes)
+        let mut number = 0;
+        core::iter::from_fn(move || self.inner.next_process_id(&mut number))
     }
 
     /// The identifiers as acceptance filters: each with a mask of the bits to compare. If an RPDO takes the frames of
     /// all nodes ([`takes_all_nodes`](crate::Application::takes_all_nodes)), there are far fewer filters than identifiers.
     pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
-        let all_nodes = self.inner.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
+        let all_nodes = self.inner.all_nodes().map(|id| (id, CanId::FUNCTION));
         self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
     }
 
     fn own_process_ids(&self) -> impl Iterator<Item = CanId> {
-        let received = self.inner.rpdos.as_ref().iter().filter_map(Rpdo::id);
-        let requests =
-            self.inner.tpdos.as_ref().iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
-        let sync = Some(self.inner.sync.id()).filter(|_| D::SERVICES.contains(Services::SYNC));
-        let time = self.inner.time_stamp.consumed().filter(|_| D::SERVICES.contains(Services::TIME));
-        [CanId::NMT].into_iter().chain(sync).chain(time).chain(received).chain(requests.map(|tpdo| tpdo.id))
+        (0..self.inner.own_frames()).filter_map(|number| self.inner.process_id(number))
     }
 }
 
 impl<D: Definition> Inner<D> {
-    pub(super) fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
+    /// The CAN-ID of the RPDO that takes the frames of all nodes.
+    fn all_nodes(&self) -> Option<CanId> {
+        if Self::has(Services::MULTIPLEXED_RPDO) { self.all_nodes.map(|(id, _)| id) } else { None }
+    }
+
+    /// How many frames the process data may take: NMT, SYNC, time stamp, RPDOs, requests for TPDOs.
+    fn own_frames(&self) -> usize {
+        3 + self.rpdos.as_ref().len() + self.tpdos.as_ref().len()
+    }
+
+    /// The CAN-ID of one of the own frames; `None` for one that is switched off.
+    fn process_id(&self, number: usize) -> Option<CanId> {
+        let rpdos = self.rpdos.as_ref();
+        match number {
+            0 => Some(CanId::NMT),
+            1 => Some(self.sync.id()).filter(|_| Self::has(Services::SYNC)),
+            2 => self.time_stamp.consumed().filter(|_| Self::has(Services::TIME)),
+            _ if number < 3 + rpdos.len() => rpdos.get(number - 3)?.id(),
+            _ => self.tpdos.as_ref().get(number - 3 - rpdos.len())?.requested(),
+        }
+    }
+
+    /// The next CAN-ID from a number on: of the own frames, then of those that all nodes send.
+    #[inline(never)]
+    fn next_process_id(&self, number: &mut usize) -> Option<CanId> {
+        while *number < self.own_frames() {
+            *number += 1;
+            let id = self.process_id(*number - 1);
+            if id.is_some() {
+                return id;
+            }
+        }
+        let all_nodes = self.all_nodes()?;
+        *number += 1;
+        all_nodes.of_node(*number - self.own_frames())
+    }
+
+    /// Whether a frame may be a SYNC, a PDO or a time stamp for this device. Most frames of other nodes are not.
+    #[inline]
+    fn is_of_process(&self, frame: &Frame) -> bool {
+        self.rpdo_filter & filter_bit(frame.id()) != 0
+            || frame.is_remote()
+            || Self::has(Services::SYNC) && self.sync.id().get() == frame.id()
+            || Self::has(Services::TIME)
+    }
+
+    fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
         if Self::has(Services::SYNC) && self.sync.accepts(frame) {
             self.on_sync(frame, context);
         } else if frame.is_remote() {
             self.each_tpdo(Chain::Valid, |tpdo, image| {
-                if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
+                if tpdo.requested().is_some_and(|id| id.get() == frame.id()) {
                     tpdo.on_remote(image, context);
                 }
             });
@@ -180,7 +241,7 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::SYNC) {
             self.poll_sync(context.now);
         }
-        let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Instant::NEVER };
+        let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Tick::NEVER };
         self.each_tpdo(Chain::Valid, |tpdo, image| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
@@ -198,6 +259,6 @@ impl<D: Definition> Inner<D> {
         }
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.
         debug_assert!(due > context.now, "process data are still due after a poll");
-        self.process_due = due.max(context.now.plus(Duration(1)));
+        self.process_due = due.max(context.now.plus(Span(1)));
     }
 }

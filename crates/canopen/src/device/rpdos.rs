@@ -5,11 +5,11 @@ use super::inner::Inner;
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, little_endian};
 use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
-use crate::{Frame, Instant};
+use crate::{Frame, Tick};
 
 impl<D: Definition> Inner<D> {
     /// Takes a data frame that may be an RPDO. A valid frame clears the faults of its RPDO.
-    pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
+    pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Tick) {
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
         }
@@ -33,7 +33,7 @@ impl<D: Definition> Inner<D> {
         }
     }
 
-    fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Instant) {
+    fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Tick) {
         let Some(rpdo) = self.rpdos.as_mut().get_mut(place) else { return };
         let late = Self::has(Services::SYNC) && rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
@@ -100,7 +100,7 @@ impl<D: Definition> Inner<D> {
     }
 
     #[inline(never)]
-    fn on_reception(&mut self, place: usize, reception: Reception, now: Instant) {
+    fn on_reception(&mut self, place: usize, reception: Reception, now: Tick) {
         self.set_rpdo_fault(place, RpdoFault::TooShort, reception == Reception::TooShort, now);
         self.set_rpdo_fault(place, RpdoFault::TooLong, reception == Reception::TooLong, now);
         if reception != Reception::TooShort {
@@ -109,7 +109,7 @@ impl<D: Definition> Inner<D> {
     }
 
     #[inline(never)]
-    fn set_rpdo_fault(&mut self, place: usize, kind: RpdoFault, active: bool, now: Instant) {
+    fn set_rpdo_fault(&mut self, place: usize, kind: RpdoFault, active: bool, now: Tick) {
         let Some(rpdo) = self.rpdos.as_mut().get_mut(place) else { return };
         if !rpdo.set_fault(kind, active) {
             return;
@@ -119,8 +119,8 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Detects missing RPDOs. Returns the next deadline.
-    pub(super) fn poll_rpdos(&mut self, now: Instant) -> Instant {
-        let (mut due, mut links) = (Instant::NEVER, self.first_rpdos);
+    pub(super) fn poll_rpdos(&mut self, now: Tick) -> Tick {
+        let (mut due, mut links) = (Tick::NEVER, self.first_rpdos);
         while let Some(rpdo) = self.rpdos.as_mut().get_mut(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
@@ -134,7 +134,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Clears the faults of a PDO that is reconfigured.
-    pub(super) fn forget_rpdo_faults(&mut self, place: u16, now: Instant) {
+    pub(super) fn forget_rpdo_faults(&mut self, place: u16, now: Tick) {
         for kind in RpdoFault::ALL {
             self.set_rpdo_fault(place.into(), kind, false, now);
         }

@@ -3,13 +3,14 @@
 use super::inner::Inner;
 use super::lss::LssSlave;
 use super::{Application as _, Definition, Device, Next, STALE};
+use crate::array::Array;
 use crate::dictionary::Services as Has;
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
 use crate::pdo::{Budget, ProcessContext};
-use crate::sdo::{Abort, Server};
-use crate::transmit::{Context, RETRY};
-use crate::{CanId, Frame, Instant, NodeId, Transmit};
+use crate::sdo::{Abort, Channel};
+use crate::transmit::Context;
+use crate::{CanId, Frame, Instant, NodeId, Span, Tick, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
 const SDO_RESPONSE: u16 = 0x580;
@@ -17,27 +18,25 @@ const SDO_REQUEST: u16 = 0x600;
 pub(super) const ERROR_CONTROL: u16 = 0x700;
 
 /// The SDO server and the LSS slave of a device, with the responses that wait for room in the queue.
+#[repr(C)] // As for `Inner`.
 pub(super) struct Services<D: Definition> {
-    server: Server<Inner<D>>,
     /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is not a
     /// request.
     sdo_request: FullFrameId,
-    /// When to send a reply of the server again that found the queue full.
-    reply_due: Instant,
-    /// When to continue a block that found the queue full.
-    block_due: Instant,
     lss: LssSlave,
     /// The share of process data in the bus.
     budget: Budget,
+    sdo: Channel<Inner<D>>,
+    /// The channels of 1201h and up.
+    pub(super) more_sdo: D::Servers,
 }
 
 impl<D: Definition> Services<D> {
     pub(super) fn new(node_id: Option<NodeId>) -> Services<D> {
         Services {
-            server: Server::new(),
+            sdo: Channel::new(),
             sdo_request: sdo_request(node_id),
-            reply_due: Instant::NEVER,
-            block_due: Instant::NEVER,
+            more_sdo: D::Servers::filled(Channel::new),
             lss: LssSlave::new(node_id),
             budget: Budget::new(BitRate::FASTEST.kbit()),
         }
@@ -60,8 +59,8 @@ impl<D: Definition> Services<D> {
     }
 
     /// Resets the services. Returns the node-ID with which the device starts.
-    pub(super) fn restart(&mut self) -> Option<NodeId> {
-        self.forget_transfer();
+    pub(super) fn restart(&mut self, inner: &mut Inner<D>) -> Option<NodeId> {
+        self.forget_transfers(inner);
         if D::Application::LSS {
             self.lss.restart();
         }
@@ -71,25 +70,37 @@ impl<D: Definition> Services<D> {
 
     /// Whether no client waits for a response, except for that of a job.
     pub(super) fn is_between_requests(&self) -> bool {
-        let waits = self.reply_due.min(self.block_due).min(self.lss.due());
-        self.server.is_between_requests() && waits == Instant::NEVER
+        let mut channels = core::iter::once(&self.sdo).chain(self.more_sdo.as_ref());
+        channels.all(Channel::is_between_requests) && self.lss.due() == Tick::NEVER
     }
 
-    fn forget_transfer(&mut self) {
-        self.server.reset();
-        (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
+    /// The epoch of the clock has moved.
+    pub(super) fn shift(&mut self, by: Span) {
+        self.sdo.shift(by);
+        self.more_sdo.as_mut().iter_mut().for_each(|sdo| sdo.shift(by));
+        if D::Application::LSS {
+            self.lss.shift(by);
+        }
+        if Inner::<D>::has_process() {
+            self.budget.shift(by);
+        }
+    }
+
+    fn forget_transfers(&mut self, inner: &mut Inner<D>) {
+        self.sdo.forget(inner);
+        self.more_sdo.as_mut().iter_mut().for_each(|sdo| sdo.forget(inner));
     }
 
     /// The time and the transmit queue for one call of the device. While the bit rate changes, the queue accepts
     /// nothing.
-    pub(super) fn context<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Context<'a, Q> {
+    pub(super) fn context<'a, Q: Transmit>(&self, now: Tick, out: &'a mut Q) -> Context<'a, Q> {
         Context { now, out, is_open: !(D::Application::LSS && self.lss.is_switching()) }
     }
 
     /// The same for process data, which have a share of the bus.
     pub(super) fn process_context<'a, Q: Transmit>(
         &'a mut self,
-        now: Instant,
+        now: Tick,
         out: &'a mut Q,
     ) -> ProcessContext<'a, Q> {
         self.budget.begin(now, || out.has_waiting_pdo());
@@ -107,31 +118,31 @@ fn sdo_request(node_id: Option<NodeId>) -> FullFrameId {
     CanId::of_service(SDO_REQUEST, node_id.map_or(0, NodeId::get)).into()
 }
 
+impl<D: Definition> Inner<D> {
+    /// The data of a request with this identifier.
+    #[inline]
+    pub(super) fn request(frame: &Frame, id: FullFrameId) -> Option<&[u8; 8]> {
+        frame.full(id).or_else(|| if D::Application::SHORT_REQUESTS { frame.short(id) } else { None })
+    }
+}
+
 impl<D: Definition> Device<D> {
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        match self.request(frame) {
-            Some(request) => {
-                // A segment of a block that only needs a place in the buffer. In any state: without SDO, there is no
-                // transfer.
-                let server = &mut self.services.server;
-                if server.takes_block() && server.take_segment(request, now) {
-                    return self.process_next();
-                }
-                self.take_request(request, now, out);
-            }
-            None => self.take_other_service(frame, now, out),
+        let now = self.tick_of_frame(now);
+        if self.take_segment(frame, now) {
+            return self.process_next();
         }
+        self.take_service_frame(frame, now, out);
         self.services_next()
     }
 
     /// Sends the frames of the services that are due, and returns a waiting action.
     #[inline]
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if now >= self.inner.services_due {
-            self.send_services(now, out);
-        }
+        let now = self.tick(now);
+        self.send_due_services(now, out);
         self.services_next()
     }
 
@@ -141,22 +152,32 @@ impl<D: Definition> Device<D> {
         let lss = D::Application::LSS.then_some(lss::REQUEST);
         let own = self.inner.node_id.filter(|_| Inner::<D>::has(Has::GUARDING));
         let guarding = own.map(|own| own.service(ERROR_CONTROL));
-        lss.into_iter().chain(sdo).chain(guarding).chain(self.inner.watches.ids())
+        let own = [lss, sdo, guarding].into_iter().flatten().chain(self.inner.watches.ids());
+        own.chain(self.inner.more_service_ids())
     }
 
-    /// Takes a request to the SDO server.
+    /// Takes a segment of a block that only needs a place in the buffer. In any state: without SDO, there is no transfer.
+    /// Returns whether the frame was one.
+    #[inline]
+    fn take_segment(&mut self, frame: &Frame, now: Tick) -> bool {
+        let request = if self.services.sdo.takes_block() { self.request(frame) } else { None };
+        request.is_some_and(|request| self.services.sdo.take_segment(request, now))
+    }
+
     #[inline(never)]
-    #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn take_request(&mut self, request: &[u8; 8], now: Instant, out: &mut impl Transmit) {
-        if self.inner.state.has_services() {
-            self.on_request(request, &mut self.services.context(now, out));
+    pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
+        let Some(request) = self.request(frame) else { return self.take_other_service(frame, now, out) };
+        if self.inner.state.has_services() && !self.take_segment(frame, now) {
+            let (context, id) = (&mut self.services.context(now, out), self.inner.service(SDO_RESPONSE));
+            let due = self.services.sdo.take(request, id, &mut self.inner, context);
+            self.inner.serve_until(due);
         }
         self.send_due_services(now, out);
     }
 
     /// Takes a frame that is no request to the SDO server: LSS, or the heartbeat of another node.
     #[inline(never)]
-    pub(super) fn take_other_service(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn take_other_service(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         if D::Application::LSS && frame.id() == lss::REQUEST.get() {
             let context = &mut self.services.context(now, out);
             self.services.lss.take_frame(frame, context, &mut self.inner);
@@ -167,6 +188,11 @@ impl<D: Definition> Device<D> {
             if Inner::<D>::has(Has::HEARTBEAT_CONSUMER) {
                 self.inner.take_heartbeat(frame, now);
             }
+        } else if Inner::<D>::has(Has::EMCY_CONSUMER) {
+            self.inner.on_emergency(frame);
+        }
+        if Inner::<D>::has(Has::SDO_SERVERS) {
+            self.take_more_sdo(frame, now, out);
         }
         self.send_due_services(now, out);
     }
@@ -174,8 +200,7 @@ impl<D: Definition> Device<D> {
     /// The data of a request to the SDO server.
     #[inline]
     fn request<'a>(&self, frame: &'a Frame) -> Option<&'a [u8; 8]> {
-        let id = self.services.sdo_request;
-        frame.full(id).or_else(|| if D::Application::SHORT_REQUESTS { frame.short(id) } else { None })
+        Inner::<D>::request(frame, self.services.sdo_request)
     }
 
     /// Whether a frame is a request to the SDO server.
@@ -185,56 +210,9 @@ impl<D: Definition> Device<D> {
     }
 
     #[inline]
-    fn send_due_services(&mut self, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn send_due_services(&mut self, now: Tick, out: &mut impl Transmit) {
         if now >= self.inner.services_due {
             self.send_services(now, out);
-        }
-    }
-
-    #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn on_request(&mut self, request: &[u8; 8], context: &mut Context<'_, impl Transmit>) {
-        let Services { server, reply_due, .. } = &mut self.services;
-        let has_reply = server.answer(request, &mut self.inner, context.now);
-        if !server.is_idle() {
-            self.inner.serve_until(server.deadline());
-        }
-        // Only a request without a reply can start a block.
-        if has_reply {
-            return self.respond(context);
-        }
-        // A reply that still waits is obsolete: the client has sent its next request.
-        *reply_due = Instant::NEVER;
-        if D::Application::BLOCK_UPLOAD && server.is_sending() {
-            self.send_block(context);
-        }
-    }
-
-    /// Sends segments of a block upload while the queue has plenty of room: a transfer must not delay PDOs.
-    #[inline(never)]
-    fn send_block(&mut self, context: &mut Context<'_, impl Transmit>) {
-        let id = self.inner.service(SDO_RESPONSE);
-        let server = &mut self.services.server;
-        let has_reply = server.send_block(&mut self.inner, context.now, |data| {
-            context.room() > Inner::<D>::RESERVED_ROOM && context.send(Frame::data_frame(id, 8, data))
-        });
-        let block_due = if server.is_sending() { context.now.plus(RETRY) } else { Instant::NEVER };
-        self.services.block_due = block_due;
-        self.inner.serve_until(block_due);
-        if has_reply {
-            self.respond(context);
-        }
-    }
-
-    /// Sends the server's reply.
-    #[inline(never)]
-    fn respond(&mut self, context: &mut Context<'_, impl Transmit>) {
-        let inner = &mut self.inner;
-        let id = inner.service(SDO_RESPONSE);
-        if context.send(Frame::data_frame(id, 8, self.services.server.reply())) {
-            self.services.reply_due = Instant::NEVER;
-        } else {
-            self.services.reply_due = context.now.plus(RETRY);
-            inner.serve_until(self.services.reply_due);
         }
     }
 
@@ -248,8 +226,9 @@ impl<D: Definition> Device<D> {
         if D::Application::LSS && lss_waits {
             self.services.lss.respond(lss::Slave::stored(result.is_ok()), context);
         }
-        if self.services.server.release(result, context.now) {
-            self.respond(context);
+        self.services.sdo.release(result, self.inner.service(SDO_RESPONSE), &mut self.inner, context);
+        if Inner::<D>::has(Has::SDO_SERVERS) {
+            self.release_more(result, context);
         }
         self.inner.services_due = STALE;
     }
@@ -257,12 +236,12 @@ impl<D: Definition> Device<D> {
     /// Forgets the transfer in a state without SDO.
     pub(super) fn silence_services(&mut self) {
         if !self.inner.state.has_services() {
-            self.services.forget_transfer();
+            self.services.forget_transfers(&mut self.inner);
         }
     }
 
     #[inline(never)]
-    fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn send_services(&mut self, now: Tick, out: &mut impl Transmit) {
         if D::Application::LSS
             && let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner)
         {
@@ -288,31 +267,24 @@ impl<D: Definition> Device<D> {
             self.silence_services();
         }
         if self.inner.state.has_services() {
-            self.poll_sdo(context);
+            let id = self.inner.service(SDO_RESPONSE);
+            self.services.sdo.poll(id, &mut self.inner, context);
+            if Inner::<D>::has(Has::SDO_SERVERS) {
+                self.poll_more_sdo(context);
+            }
         }
         self.inner.services_due = self.next_service();
         debug_assert!(self.inner.services_due > now, "what is due does not stay due");
     }
 
-    fn poll_sdo(&mut self, context: &mut Context<'_, impl Transmit>) {
-        // Both are checked: the deadline of the transfer may have passed while a reply waited for room.
-        let is_expired = self.services.server.expire(context.now);
-        if is_expired || context.now >= self.services.reply_due {
-            self.respond(context);
-        }
-        if D::Application::BLOCK_UPLOAD && context.now >= self.services.block_due {
-            self.send_block(context);
-        }
-    }
-
-    fn next_service(&self) -> Instant {
+    fn next_service(&self) -> Tick {
         let (services, inner) = (&self.services, &self.inner);
-        let lss = if D::Application::LSS { services.lss.due() } else { Instant::NEVER };
+        let lss = if D::Application::LSS { services.lss.due() } else { Tick::NEVER };
         if inner.is_initialising() {
             return lss;
         }
         let due = lss.min(inner.heartbeat.due()).min(self.inner.errors_due());
-        // In a state without SDO there is no transfer, and none of these three deadlines is set.
-        due.min(services.server.deadline()).min(services.reply_due).min(services.block_due)
+        // In a state without SDO there is no transfer, and none of these deadlines is set.
+        services.more_sdo.as_ref().iter().fold(due.min(services.sdo.due()), |due, sdo| due.min(sdo.due()))
     }
 }

@@ -134,7 +134,8 @@ impl<D: Definition> Device<D> {
     /// [`Device`](super::Device) starts by itself with the next [`publish`](super::Device::publish). A node-ID that LSS has configured is
     /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        let node_id = self.services.restart();
+        let now = self.tick(now);
+        let node_id = self.services.restart(&mut self.inner);
         self.inner.enter(State::Initialising);
         self.inner.node_id = node_id;
         self.load();
@@ -144,7 +145,8 @@ impl<D: Definition> Device<D> {
             inner.heartbeat.boot_up(low_half(inner.number(0x1017, 0)), now);
             self.inner.enter(State::PreOperational);
         }
-        self.poll_services(now, out)
+        self.send_due_services(now, out);
+        self.next()
     }
 
     /// Loads the values with which [`start`](Device::start) will begin, for parameters that are needed before the bus
@@ -197,10 +199,17 @@ impl<D: Definition> Device<D> {
     #[inline]
     pub(super) fn process_next(&self) -> Next {
         let Inner { process_due, services_due, .. } = self.inner;
-        Next { process: process_due, services: services_due, action: None, parameters: false }
+        let (process, services) = (self.clock.instant(process_due), self.clock.instant(services_due));
+        Next { process, services, action: None, parameters: false }
     }
 
     /// Result of a call for services, with one waiting action.
+    #[inline(never)]
+    pub(super) fn next(&mut self) -> Next {
+        self.services_next()
+    }
+
+    /// As [`next`](Device::next), for a caller that ignores a part of the result.
     #[inline]
     pub(super) fn services_next(&mut self) -> Next {
         let inner = &mut self.inner;

@@ -12,7 +12,7 @@ use crate::emcy::Fault;
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::{Duration, Instant, Transmit};
+use crate::{Duration, Instant, Tick, Transmit};
 
 /// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -91,6 +91,7 @@ impl<D: Definition> Device<D> {
     /// Reports the end of the job: `result` goes to the clients that wait for it. If an equal request has followed the
     /// handover, the job is handed over again instead, and the clients wait for the second run.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
+        let now = self.tick(now);
         if let Some(job) = self.inner.jobs.take_repeated() {
             self.inner.pending.ask_for(job);
             self.inner.services_due = STALE;
@@ -109,11 +110,10 @@ impl<D: Definition> Device<D> {
     #[must_use]
     pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
         let inner = &self.inner;
+        let due = inner.heartbeat.latest().min(inner.watches.due()).min(inner.guarding.due());
         matches!(inner.state, State::PreOperational | State::Stopped)
             && self.services.is_between_requests()
-            && now + span <= inner.heartbeat.latest()
-            && now + span <= inner.watches.due()
-            && now + span <= inner.guarding.due()
+            && now + span <= self.clock.instant(due)
     }
 }
 
@@ -190,6 +190,29 @@ impl<D: Definition> Inner<D> {
         }
     }
 
+    /// The job that a write to a command begins. A calibration cannot be restored: no defaults would fit a real transducer.
+    pub(super) fn command(&self, entry: &Entry, value: u32) -> Result<Job, Abort> {
+        match (entry.rule(), value) {
+            (Rule::Setting, _) => Ok(Job::Setting(value.to_le_bytes()[0])),
+            (Rule::StoreCalibration, SAVE) => Ok(Job::Store(Groups::one(Group::Calibration))),
+            (Rule::Store, SAVE) => self.groups_of(entry).map(Job::Store),
+            (Rule::Restore, LOAD) => self.groups_of(entry).map(Job::Restore),
+            (Rule::Store | Rule::Restore, _) => self.groups_of(entry).and(Err(Abort::NotStored)),
+            _ => Err(Abort::NotStored),
+        }
+    }
+
+    /// The groups of a sub-index of 1010h or 1011h. Sub-index 1 covers the groups of the product, too.
+    fn groups_of(&self, entry: &Entry) -> Result<Groups, Abort> {
+        let mut groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
+        if Self::has(Services::OWN_GROUPS) && entry.sub() == 1 {
+            for group in Group::OWN {
+                groups.set(group, self.dictionary.find(entry.index(), group.sub()).is_ok());
+            }
+        }
+        Ok(groups)
+    }
+
     /// Loads the stored values of a group. If they are damaged or do not fit, the whole group keeps its defaults.
     pub(super) fn load_stored(&mut self, group: Group) {
         let Stored { packed, soundness } = self.application.stored(group);
@@ -211,29 +234,14 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Reports groups that could not be loaded, by EMCY.
-    pub(super) fn report_stored(&mut self, now: Instant) {
-        for group in Group::ALL {
+    pub(super) fn report_stored(&mut self, now: Tick) {
+        let groups = if Self::has(Services::OWN_GROUPS) { &Group::ALL[..] } else { &Group::COMMON[..] };
+        for &group in groups {
             let (lost, older) = (self.lost.contains(group), self.older.contains(group));
             self.set_fault(Fault::StoredData(group), lost, now);
             self.set_fault(Fault::OlderData(group), older, now);
         }
     }
-}
-
-/// The job that a write to a command begins. A calibration cannot be restored: no defaults would fit a real transducer.
-pub(super) fn command(entry: &Entry, value: u32) -> Result<Job, Abort> {
-    match (entry.rule(), value) {
-        (Rule::Setting, _) => Ok(Job::Setting(value.to_le_bytes()[0])),
-        (Rule::StoreCalibration, SAVE) => Ok(Job::Store(Groups::one(Group::Calibration))),
-        (Rule::Store, SAVE) => groups_of(entry).map(Job::Store),
-        (Rule::Restore, LOAD) => groups_of(entry).map(Job::Restore),
-        (Rule::Store | Rule::Restore, _) => groups_of(entry).and(Err(Abort::NotStored)),
-        _ => Err(Abort::NotStored),
-    }
-}
-
-fn groups_of(entry: &Entry) -> Result<Groups, Abort> {
-    Groups::of_sub(entry.sub()).ok_or(Abort::Access)
 }
 
 /// Checks a command for the running program (1F51h).

@@ -8,10 +8,10 @@ use crate::emcy::Fault;
 use crate::pdo::{Chain, ProcessContext};
 use crate::sync::Settings;
 use crate::transmit::RETRY;
-use crate::{Frame, Instant, Transmit};
+use crate::{Frame, Tick, Transmit};
 
 impl<D: Definition> Inner<D> {
-    pub(super) fn configure_sync(&mut self, now: Instant) {
+    pub(super) fn configure_sync(&mut self, now: Tick) {
         let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
         let settings = Settings {
             cob_id: self.number_or(0x1005, 0, 0x80),
@@ -77,7 +77,7 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Detects a missing SYNC, and drops TPDOs that were not sent within the synchronous window.
-    pub(super) fn poll_sync(&mut self, now: Instant) {
+    pub(super) fn poll_sync(&mut self, now: Tick) {
         if self.sync.expire(now) {
             self.raise(Fault::SyncMissing, now);
             self.process_due = STALE;

@@ -10,13 +10,13 @@ use crate::emcy::Fault;
 use crate::heartbeat::{Change, Watch};
 use crate::sdo::Abort;
 use crate::transmit::Context;
-use crate::{Frame, Instant, Transmit};
+use crate::{Frame, Tick, Transmit};
 
 const CONSUMER_TIME: u16 = 0x1016;
 
 impl<D: Definition> Inner<D> {
     #[inline(never)]
-    pub(super) fn take_heartbeat(&mut self, frame: &Frame, now: Instant) {
+    pub(super) fn take_heartbeat(&mut self, frame: &Frame, now: Tick) {
         if self.is_initialising() {
             return;
         }
@@ -46,14 +46,14 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Gives life guarding its times, from 100Ch and 100Dh.
-    pub(super) fn configure_guarding(&mut self, now: Instant) {
+    pub(super) fn configure_guarding(&mut self, now: Tick) {
         let [factor, ..] = self.number(0x100D, 0).to_le_bytes();
         if self.guarding.configure(low_half(self.number(0x100C, 0)), factor) {
             self.clear(Fault::LifeGuard, now);
         }
     }
 
-    pub(super) fn on_watch(&mut self, change: Change, now: Instant) {
+    pub(super) fn on_watch(&mut self, change: Change, now: Tick) {
         match change {
             Change::Lost(number) => self.raise(Fault::Heartbeat(number), now),
             Change::Back(number) => self.clear(Fault::Heartbeat(number), now),
@@ -76,14 +76,14 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Configures the monitoring of a node, and clears its fault.
-    pub(super) fn configure_watch(&mut self, sub: u8, now: Instant) {
+    pub(super) fn configure_watch(&mut self, sub: u8, now: Tick) {
         let number = sub.saturating_sub(1);
         if self.watches.configure(number.into(), self.watch(sub)) {
             self.clear(Fault::Heartbeat(number), now);
         }
     }
 
-    pub(super) fn configure_watches(&mut self, now: Instant) {
+    pub(super) fn configure_watches(&mut self, now: Tick) {
         for sub in (1..=u8::MAX).take(self.watches.len()) {
             self.configure_watch(sub, now);
         }

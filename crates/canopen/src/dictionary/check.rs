@@ -25,12 +25,16 @@ pub const fn check(rows: &[Object]) {
         let has_sub_0 = row.sub == 0 || (i > 0 && rows[i - 1].index == row.index);
         require(has_sub_0, row, "the object has no sub-index 0");
         check_row(row);
+        let is_more = row.index > 0x1201 && row.index < 0x1280;
+        let follows = !is_more || row.sub > 0 || (i > 0 && rows[i - 1].index + 1 == row.index);
+        require(follows, row, "further SDO servers begin at 1201h and have no gap");
         i += 1;
     }
     // The order of the rows is checked by now: they are found by a binary search.
     i = 0;
     while i < rows.len() {
         check_event_timer(rows, &rows[i]);
+        check_group(rows, &rows[i]);
         check_pdo_row(rows, i);
         i += 1;
     }
@@ -52,12 +56,22 @@ const fn check_event_timer(rows: &[Object], row: &Object) {
     require(!has_limits, row, "an event timer with two names has no limits");
 }
 
+/// A value in a group of the product is stored by a sub-index of 1010h.
+const fn check_group(rows: &[Object], row: &Object) {
+    let Some(group) = row.group else { return };
+    let is_stored = !group.is_own() || find(rows, 0x1010, group.sub()).is_some();
+    require(is_stored, row, "1010h has no sub-index for the storage group");
+}
+
 const fn check_row(row: &Object) {
     require(row.sub < u8::MAX, row, "an object has at most 255 entries, 0 to 254");
+    require(row.index != 0x1028 || row.sub <= 127, row, "the sub-index is a node-ID, 1 to 127");
     check_rule(row);
     check_limits(row);
     check_default(row);
     check_mapping(row);
+    let is_group = !matches!(row.rule, Rule::Store | Rule::Restore) || row.sub <= 8;
+    require(is_group, row, "storage groups of a product have the sub-indexes 4 to 8");
     // A read-only value can be stored too, such as the offset that the device computes from a preset.
     let lasts = matches!(row.access, Access::ReadWrite | Access::ReadOnly);
     require(row.group.is_none() || lasts, row, "a constant or a command cannot be stored");

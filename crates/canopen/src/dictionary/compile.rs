@@ -243,6 +243,8 @@ pub struct Sizes {
     pub watches: usize,
     /// Number of objects that a multiplexed TPDO can send; 0 if no TPDO can be multiplexed.
     pub scanned: usize,
+    /// Number of SDO servers beside the default one: objects 1201h and up.
+    pub servers: usize,
     /// The services that the rows ask for.
     pub services: Services,
 }
@@ -252,13 +254,14 @@ impl Sizes {
     #[must_use]
     pub const fn of(rows: &[Object]) -> Sizes {
         let (image, services) = (image_size(rows), Services::of(rows));
-        let mut sizes = Sizes { image, tpdos: 0, rpdos: 0, watches: 0, scanned: 0, services };
+        let mut sizes = Sizes { image, tpdos: 0, rpdos: 0, watches: 0, scanned: 0, servers: 0, services };
         let (mut i, mut is_multiplexed) = (0, false);
         while i < rows.len() {
             let row = &rows[i];
             sizes.tpdos += (row.sub == 0 && row.index & 0xFE00 == 0x1800) as usize;
             sizes.rpdos += (row.sub == 0 && row.index & 0xFE00 == 0x1400) as usize;
             sizes.watches += (row.sub > 0 && row.index == 0x1016) as usize;
+            sizes.servers += (row.sub == 0 && row.index > 0x1200 && row.index < 0x1280) as usize;
             sizes.scanned += (row.mapping.allows_tpdo() && row.kind.size() <= 4) as usize;
             is_multiplexed |= row.sub == 0 && row.index & 0xFE00 == 0x1A00 && can_be_multiplexed(row);
             i += 1;
@@ -280,6 +283,7 @@ impl Sizes {
                 rpdos: larger(sizes.rpdos, own.rpdos),
                 watches: larger(sizes.watches, own.watches),
                 scanned: larger(sizes.scanned, own.scanned),
+                servers: larger(sizes.servers, own.servers),
                 services: sizes.services.with(own.services),
             };
             i += 1;
@@ -295,6 +299,7 @@ impl Sizes {
             && self.rpdos <= room.rpdos
             && self.watches <= room.watches
             && self.scanned <= room.scanned
+            && self.servers <= room.servers
             && room.services.contains(self.services)
     }
 }
@@ -324,20 +329,30 @@ pub(super) const fn can_be_multiplexed(count: &Object) -> bool {
 #[macro_export]
 macro_rules! device {
     ($application:ty, room: $sizes:expr) => {
-        $crate::Device<
-            $crate::plumbing::Rows<
-                $application,
-                { $sizes.image },
-                { $sizes.tpdos },
-                { $sizes.rpdos },
-                { $sizes.watches },
-                { $sizes.scanned },
-                { $sizes.services.bits() },
-            >,
+        $crate::Device<$crate::definition!($application, room: $sizes)>
+    };
+    ($application:ty, $rows:expr) => {
+        $crate::Device<$crate::definition!($application, $rows)>
+    };
+}
+
+/// The [`Definition`](crate::Definition) of [`device!`](crate::device!), for code that is generic over devices.
+#[macro_export]
+macro_rules! definition {
+    ($application:ty, room: $sizes:expr) => {
+        $crate::plumbing::Rows<
+            $application,
+            { $sizes.image },
+            { $sizes.tpdos },
+            { $sizes.rpdos },
+            { $sizes.watches },
+            { $sizes.scanned },
+            { $sizes.servers },
+            { $sizes.services.bits() },
         >
     };
     ($application:ty, $rows:expr) => {
-        $crate::device!($application, room: $crate::dictionary::Sizes::of($rows))
+        $crate::definition!($application, room: $crate::dictionary::Sizes::of($rows))
     };
 }
 

@@ -63,7 +63,7 @@ impl Entry {
 
     /// Whether the value is a parameter of the application.
     pub(crate) const fn is_parameter(&self) -> bool {
-        matches!(self.attributes.group, Some(Group::Application | Group::Calibration))
+        !matches!(self.attributes.group, None | Some(Group::Communication))
     }
 
     pub(crate) const fn is_writable(&self) -> bool {

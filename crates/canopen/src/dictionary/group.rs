@@ -4,6 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Group {
     /// Communication parameters, sub-index 2 of 1010h and 1011h.
     Communication,
@@ -11,11 +12,50 @@ pub enum Group {
     Application,
     /// The calibration. It has a store command of its own; 1010h and 1011h do not affect it.
     Calibration,
+    /// A group of the product, sub-index 4.
+    Own4,
+    /// A group of the product, sub-index 5.
+    Own5,
+    /// A group of the product, sub-index 6.
+    Own6,
+    /// A group of the product, sub-index 7.
+    Own7,
+    /// A group of the product, sub-index 8.
+    Own8,
 }
 
 impl Group {
+    /// The groups that every product can have without sub-indexes of its own.
+    pub const COMMON: [Group; 3] = [Group::Communication, Group::Application, Group::Calibration];
+    /// The groups of the product: sub-indexes 4 to 8 of 1010h and 1011h.
+    pub const OWN: [Group; 5] = [Group::Own4, Group::Own5, Group::Own6, Group::Own7, Group::Own8];
     /// All groups.
-    pub const ALL: [Group; 3] = [Group::Communication, Group::Application, Group::Calibration];
+    pub const ALL: [Group; 8] = [
+        Group::Communication,
+        Group::Application,
+        Group::Calibration,
+        Group::Own4,
+        Group::Own5,
+        Group::Own6,
+        Group::Own7,
+        Group::Own8,
+    ];
+
+    /// The sub-index of the group in 1010h and 1011h; 0 for the calibration.
+    #[must_use]
+    pub const fn sub(self) -> u8 {
+        match self {
+            Group::Communication => 2,
+            Group::Application => 3,
+            Group::Calibration => 0,
+            own => own as u8 + 1,
+        }
+    }
+
+    /// Whether the group is one of the product.
+    pub(crate) const fn is_own(self) -> bool {
+        self as u8 >= Group::Own4 as u8
+    }
 }
 
 /// A set of storage groups.
@@ -26,7 +66,8 @@ pub struct Groups(u8);
 impl Groups {
     /// No group.
     pub const NONE: Groups = Groups(0);
-    /// The groups of sub-index 1 of 1010h and 1011h: communication and application.
+    /// The groups of sub-index 1 of 1010h and 1011h: communication and application. A product with groups of its own has
+    /// them beside these.
     pub const ALL_PARAMETERS: Groups =
         Groups(1 << Group::Communication as u8 | 1 << Group::Application as u8);
 
@@ -43,6 +84,7 @@ impl Groups {
             1 => Some(Groups::ALL_PARAMETERS),
             2 => Some(Groups::one(Group::Communication)),
             3 => Some(Groups::one(Group::Application)),
+            4..=8 => Some(Groups(1 << (sub - 1))),
             _ => None,
         }
     }

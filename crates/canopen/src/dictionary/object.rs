@@ -189,7 +189,7 @@ impl Object {
     /// the device itself.
     #[must_use]
     pub const fn is_configuration(&self) -> bool {
-        let is_stored = matches!(self.group, Some(Group::Communication | Group::Application));
+        let is_stored = !matches!(self.group, None | Some(Group::Calibration));
         is_stored && matches!(self.access, Access::ReadWrite) && !self.acts
     }
 

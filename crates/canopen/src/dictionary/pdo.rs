@@ -45,6 +45,10 @@ pub(crate) enum Direction {
     Receive,
 }
 
+impl Direction {
+    pub(crate) const BOTH: [Direction; 2] = [Direction::Transmit, Direction::Receive];
+}
+
 /// The addressing mode of a multiplexed PDO: a special number of mapped objects (1600h.., 1A00h..:0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Addressing {

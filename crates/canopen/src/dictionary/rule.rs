@@ -39,6 +39,12 @@ pub enum Rule {
     HeartbeatTime,
     /// 1019h, synchronous counter overflow value.
     SyncOverflow,
+    /// 1028h:1 and up, COB-ID of the EMCY of another node.
+    EmcyWatch,
+    /// 1201h to 127Fh:1 and 2, COB-ID of a further SDO server.
+    SdoServerCobId,
+    /// 1280h to 12FFh:1 and 2, COB-ID of an SDO client.
+    SdoClientCobId,
     /// 1F51h:1, program control of the running program (CiA 302-3).
     ProgramControl,
     /// 1F80h, NMT start-up.
@@ -90,6 +96,9 @@ impl Rule {
             (0x1016, 1..) => Rule::HeartbeatWatch,
             (0x1017, 0) => Rule::HeartbeatTime,
             (0x1019, 0) => Rule::SyncOverflow,
+            (0x1028, 1..) => Rule::EmcyWatch,
+            (0x1201..=0x127F, 1 | 2) => Rule::SdoServerCobId,
+            (0x1280..=0x12FF, 1 | 2) => Rule::SdoClientCobId,
             (0x1F51, 1) => Rule::ProgramControl,
             (0x1F80, 0) => Rule::StartUp,
             (0x1FA0, 1..) => Rule::ScannerLine,
@@ -153,6 +162,9 @@ impl Rule {
             Rule::TimeCobId => 28,
             Rule::GuardTime => 29,
             Rule::LifeTimeFactor => 30,
+            Rule::EmcyWatch => 31,
+            Rule::SdoServerCobId => 32,
+            Rule::SdoClientCobId => 33,
             Rule::EventTimerOf(number) => 0x100 | number as u16,
         }
     }

@@ -33,12 +33,21 @@ impl Services {
     /// Node guarding and life guarding: the rows have 100Ch.
     pub const GUARDING: Services = Services(1 << 9);
 
-    /// TPDOs, RPDOs, the heartbeat consumer and the multiplexed TPDO follow from the numbers in
+    /// EMCY consumer: the rows have 1028h.
+    pub const EMCY_CONSUMER: Services = Services(1 << 10);
+    /// SDO client: the rows have 1280h or a further object of this kind.
+    pub const SDO_CLIENT: Services = Services(1 << 11);
+
+    /// Storage groups of the product: the rows have a sub-index of 4 and up in 1010h or 1011h.
+    pub const OWN_GROUPS: Services = Services(1 << 12);
+
+    /// TPDOs, RPDOs, the heartbeat consumer, the multiplexed TPDO and further SDO servers follow from the numbers in
     /// [`Sizes`](super::Sizes).
     pub(crate) const TPDO: Services = Services(1 << 16);
     pub(crate) const RPDO: Services = Services(1 << 17);
     pub(crate) const HEARTBEAT_CONSUMER: Services = Services(1 << 18);
     pub(crate) const MULTIPLEXED_TPDO: Services = Services(1 << 19);
+    pub(crate) const SDO_SERVERS: Services = Services(1 << 20);
 
     /// None of these services.
     pub const NONE: Services = Services(0);
@@ -55,10 +64,13 @@ impl Services {
             services = services.with(match row.rule {
                 Rule::SyncCobId => Services::SYNC,
                 Rule::EmcyCobId => Services::EMCY,
+                Rule::Store | Rule::Restore if row.sub > 3 => Services::STORE.with(Services::OWN_GROUPS),
                 Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting => Services::STORE,
                 Rule::SyncProducer => Services::SYNC.with(Services::SYNC_PRODUCER),
                 Rule::GuardTime => Services::GUARDING,
                 Rule::TimeCobId => Services::TIME,
+                Rule::EmcyWatch => Services::EMCY_CONSUMER,
+                Rule::SdoClientCobId => Services::SDO_CLIENT,
                 Rule::ProgramControl => Services::PROGRAM_CONTROL,
                 Rule::StartUp => Services::SELF_START,
                 Rule::PdoCount if row.index < 0x1800 && can_be_multiplexed(row) => Services::MULTIPLEXED_RPDO,

@@ -147,6 +147,21 @@ impl Dictionary {
         place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
 
+    /// The entries of an object; none for an unknown index.
+    pub(crate) fn object(&self, index: u16) -> impl Iterator<Item = Entry> {
+        let found = self.series_of(index, 0).ok();
+        found.into_iter().flat_map(move |(series, number)| {
+            self.places_of(series).iter().filter_map(move |place| self.entry(series, number, *place))
+        })
+    }
+
+    /// The indexes of the objects from `first` on that are below `end`.
+    pub(crate) fn indexes(&self, first: u16, end: u16) -> impl Iterator<Item = u16> {
+        let all =
+            self.series.iter().flat_map(|series| (0..series.objects).map(|n| series.index + u16::from(n)));
+        all.filter(move |index| (first..end).contains(index))
+    }
+
     /// The series that contains an object, and the number of the object in the series.
     #[inline]
     fn series_of(&self, index: u16, sub: u8) -> Result<(&'static Series, u16), Abort> {

@@ -30,7 +30,7 @@ pub enum Fault {
     /// The RPDO with this number has not arrived in time (8250h).
     RpdoDeadline(u16),
     /// The stored values of a group could not be loaded, so the defaults are in use (6302h communication, 6303h
-    /// application, 6300h calibration; the first byte of the error field is 2).
+    /// application, 6300h calibration, 6304h to 6308h groups of the product; the first byte of the error field is 2).
     StoredData(Group),
     /// The newest stored values of a group could not be loaded, so the values of the save before are in use (the same
     /// codes; the first byte of the error field is 1).
@@ -89,24 +89,30 @@ const GENERIC: u8 = 1;
 const COMMUNICATION: u8 = 1 << 4;
 
 impl Fault {
-    /// The faults that can be active only once, in the order of their bits: communication, then the storage groups.
-    const SINGLE: [Fault; 13] = [
+    /// The number of faults that can be active only once: those of communication, then those of the storage groups.
+    const SINGLES: usize = Fault::COMMUNICATION.len() + 2 * Group::ALL.len();
+    const COMMUNICATION: [Fault; 7] = [
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
         Fault::SyncMissing,
         Fault::SyncLength,
         Fault::MpdoNotTaken,
-        Fault::StoredData(Group::Communication),
-        Fault::StoredData(Group::Application),
-        Fault::StoredData(Group::Calibration),
-        Fault::OlderData(Group::Communication),
-        Fault::OlderData(Group::Application),
-        Fault::OlderData(Group::Calibration),
         Fault::LifeGuard,
     ];
-    /// The bits of the communication faults in that list.
-    const OF_COMMUNICATION: u16 = 0x3F | 1 << 12;
+    /// The bits of the communication faults.
+    const OF_COMMUNICATION: u32 = 0x7F;
+
+    /// The fault with this bit.
+    fn single(bit: usize) -> Option<Fault> {
+        let group = |at: usize| Group::ALL.get(at & 7).copied();
+        match bit.checked_sub(Fault::COMMUNICATION.len()) {
+            None => Fault::COMMUNICATION.get(bit).copied(),
+            Some(at @ 0..=7) => group(at).map(Fault::StoredData),
+            Some(at @ 8..=15) => group(at).map(Fault::OlderData),
+            _ => None,
+        }
+    }
 
     /// The bit of a fault that can be active only once; `None` for a fault with a number.
     const fn bit(self) -> Option<u8> {
@@ -117,9 +123,9 @@ impl Fault {
             Fault::SyncMissing => Some(3),
             Fault::SyncLength => Some(4),
             Fault::MpdoNotTaken => Some(5),
-            Fault::StoredData(group) => Some(6 + group as u8),
-            Fault::OlderData(group) => Some(9 + group as u8),
-            Fault::LifeGuard => Some(12),
+            Fault::LifeGuard => Some(6),
+            Fault::StoredData(group) => Some(7 + group as u8),
+            Fault::OlderData(group) => Some(15 + group as u8),
             _ => None,
         }
     }
@@ -140,11 +146,7 @@ impl Fault {
             Fault::RpdoTooShort(_) => 0x8210,
             Fault::RpdoTooLong(_) => 0x8220,
             Fault::RpdoDeadline(_) => 0x8250,
-            Fault::StoredData(group) | Fault::OlderData(group) => match group {
-                Group::Communication => 0x6302,
-                Group::Application => 0x6303,
-                Group::Calibration => 0x6300,
-            },
+            Fault::StoredData(group) | Fault::OlderData(group) => 0x6300 | u16::from(group.sub()),
             Fault::Application(number) => {
                 return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
             }
@@ -175,7 +177,7 @@ impl Fault {
 /// of them are active.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct FaultSet {
-    single: u16,
+    single: u32,
     application: u32,
     several: u16,
 }
@@ -211,11 +213,11 @@ impl FaultSet {
 
     /// The active faults, without those of heartbeats and RPDOs.
     pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
-        (0..Fault::SINGLE.len() + 32).filter_map(move |place| {
-            if let Some(fault) = Fault::SINGLE.get(place) {
-                return (self.single & 1 << place != 0).then_some(*fault);
+        (0..Fault::SINGLES + 32).filter_map(move |place| {
+            if let Some(fault) = Fault::single(place) {
+                return (self.single & 1 << place != 0).then_some(fault);
             }
-            let number = u8::try_from(place - Fault::SINGLE.len()).unwrap_or(u8::MAX);
+            let number = u8::try_from(place - Fault::SINGLES).unwrap_or(u8::MAX);
             (self.application & application_bit(number) != 0).then_some(Fault::Application(number))
         })
     }
@@ -244,7 +246,7 @@ mod tests {
 
     #[test]
     fn every_fault_has_its_own_bit() {
-        let all = || Fault::SINGLE.into_iter().chain((0..32).map(Fault::Application));
+        let all = || (0..Fault::SINGLES).filter_map(Fault::single).chain((0..32).map(Fault::Application));
         let mut set = FaultSet::default();
         assert!(all().all(|fault| set.insert(fault)));
         assert!(set.singles().eq(all()));

@@ -8,4 +8,4 @@ mod producer;
 use fault::FaultSet;
 pub use fault::{Condition, ErrorClass, Fault};
 pub use message::Message;
-pub(crate) use producer::{OFF, Producer, check_cob_id};
+pub(crate) use producer::{OFF, Producer};

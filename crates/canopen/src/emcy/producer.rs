@@ -2,9 +2,8 @@
 
 use super::history::History;
 use super::{Condition, ErrorClass, Fault, FaultSet, Message};
-use crate::sdo::Abort;
 use crate::transmit::{Context, RETRY};
-use crate::{CobId, Duration, Frame, Instant, Transmit};
+use crate::{CobId, Frame, Span, Tick, Transmit};
 use heapless::Deque;
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
@@ -32,8 +31,8 @@ pub(crate) struct Producer {
     /// 1015h, in 100 us.
     inhibit: u16,
     /// When the last message was sent, or `NEVER`.
-    sent_at: Instant,
-    due: Instant,
+    sent_at: Tick,
+    due: Tick,
     /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_error`].
     errors: u8,
 }
@@ -48,10 +47,16 @@ impl Producer {
             history: History::new(),
             waiting: Deque::new(),
             inhibit: 0,
-            sent_at: Instant::NEVER,
-            due: Instant::NEVER,
+            sent_at: Tick::NEVER,
+            due: Tick::NEVER,
             errors: 0,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.sent_at.shift(by);
+        self.due.shift(by);
     }
 
     /// Takes the COB-ID of 1014h. Bit 31 disables EMCY. Returns whether this value switches EMCY on.
@@ -62,7 +67,7 @@ impl Producer {
     }
 
     /// Takes the inhibit time of 1015h. It applies to a waiting message, too.
-    pub(crate) fn set_inhibit(&mut self, inhibit: u16, now: Instant) {
+    pub(crate) fn set_inhibit(&mut self, inhibit: u16, now: Tick) {
         self.inhibit = inhibit;
         if !self.is_idle() {
             self.due = self.next_due(now);
@@ -71,15 +76,15 @@ impl Producer {
 
     /// When the next message may be sent.
     #[inline(never)]
-    fn next_due(&self, now: Instant) -> Instant {
+    fn next_due(&self, now: Tick) -> Tick {
         match self.sent_at {
-            Instant::NEVER => now,
-            sent => sent.plus(Duration::from_inhibit(self.inhibit)).max(now),
+            Tick::NEVER => now,
+            sent => sent.plus(Span::from_inhibit(self.inhibit)).max(now),
         }
     }
 
     /// After a reset: clears the history, and reports the faults that are still active again.
-    pub(crate) fn restart(&mut self, details: impl Fn(u8) -> Detail, now: Instant) {
+    pub(crate) fn restart(&mut self, details: impl Fn(u8) -> Detail, now: Tick) {
         self.history.clear();
         self.forget_waiting();
         self.errors = 0;
@@ -89,7 +94,7 @@ impl Producer {
 
     // Not inlined: two callers, and much code.
     #[inline(never)]
-    fn raise_singles(&mut self, faults: FaultSet, details: impl Fn(u8) -> Detail, now: Instant) {
+    fn raise_singles(&mut self, faults: FaultSet, details: impl Fn(u8) -> Detail, now: Tick) {
         for fault in faults.singles() {
             self.active.insert(fault);
             let detail = if let Fault::Application(number) = fault { details(number) } else { None };
@@ -98,7 +103,7 @@ impl Producer {
     }
 
     /// Sets a fault. Returns whether the fault is new.
-    pub(crate) fn raise(&mut self, fault: Fault, detail: Detail, now: Instant) -> bool {
+    pub(crate) fn raise(&mut self, fault: Fault, detail: Detail, now: Tick) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
             self.errors |= self.repeat(fault, detail, now);
@@ -131,14 +136,14 @@ impl Producer {
 
     /// Reports an active fault, and returns the bit of its class.
     #[inline(never)]
-    pub(crate) fn repeat(&mut self, fault: Fault, own: Detail, now: Instant) -> u8 {
+    pub(crate) fn repeat(&mut self, fault: Fault, own: Detail, now: Tick) -> u8 {
         let Condition { code, detail, class, .. } = fault.condition(self.conditions);
         self.report(code, own.unwrap_or(detail), now);
         class.map_or(0, error_bit)
     }
 
     /// Reports the active faults again, without those of heartbeats and RPDOs. They are no new errors.
-    pub(crate) fn repeat_singles(&mut self, details: impl Fn(u8) -> Detail, now: Instant) {
+    pub(crate) fn repeat_singles(&mut self, details: impl Fn(u8) -> Detail, now: Tick) {
         let errors = self.errors;
         self.raise_singles(self.active, details, now);
         self.errors = errors;
@@ -159,7 +164,7 @@ impl Producer {
     /// Discards the waiting messages.
     pub(crate) fn forget_waiting(&mut self) {
         self.waiting.clear();
-        self.due = Instant::NEVER;
+        self.due = Tick::NEVER;
     }
 
     /// Whether no message waits.
@@ -168,7 +173,7 @@ impl Producer {
     }
 
     /// Clears a fault. Returns whether the fault was active. After the last active fault, code 0000h is sent.
-    pub(crate) fn clear(&mut self, fault: Fault, now: Instant) -> bool {
+    pub(crate) fn clear(&mut self, fault: Fault, now: Tick) -> bool {
         let was_active = self.active.remove(fault);
         if was_active && self.active.is_empty() {
             self.report(0, [0; 5], now);
@@ -176,7 +181,7 @@ impl Producer {
         was_active
     }
 
-    fn report(&mut self, code: u16, detail: [u8; 5], now: Instant) {
+    fn report(&mut self, code: u16, detail: [u8; 5], now: Tick) {
         let message = Message { code, register: self.register(), detail };
         // In a full queue, the message replaces the newest one. The older messages tell how the trouble began; this
         // message tells the present state.
@@ -203,7 +208,7 @@ impl Producer {
     }
 
     /// The next instant at which a message is due.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
@@ -230,20 +235,11 @@ impl Producer {
                 return;
             }
         }
-        self.due = Instant::NEVER;
+        self.due = Tick::NEVER;
     }
 }
 
 /// The bit of a class in a set of eight; 0 for a class beyond them.
 fn error_bit(ErrorClass(sub): ErrorClass) -> u8 {
     1_u8.checked_shl(sub.into()).unwrap_or(0)
-}
-
-/// Checks a new value of 1014h: the CAN-ID can change only while EMCY is disabled (bit 31). EMCY that is enabled needs a
-/// configurable CAN-ID.
-pub(crate) fn check_cob_id(old: u32, new: u32) -> Result<(), Abort> {
-    let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
-    let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
-    let moves = !old.bit31 && old.id != new.id;
-    if !new.bit31 && (moves || new.id.is_restricted()) { Err(Abort::InvalidValue) } else { Ok(()) }
 }

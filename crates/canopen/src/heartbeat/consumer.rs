@@ -2,7 +2,7 @@
 
 use crate::array::Array;
 use crate::nmt::State;
-use crate::{CanId, Duration, Frame, Instant, NodeId};
+use crate::{CanId, Frame, NodeId, Span, Tick};
 
 /// An entry of 1016h: a node, and the longest time between two of its heartbeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub(crate) enum Change {
 pub struct Monitored {
     watch: Option<Watch>,
     /// When the heartbeat is missing. `NEVER` until the first heartbeat, and while the heartbeat is lost.
-    due: Instant,
+    due: Tick,
     is_lost: bool,
     /// The state in the last heartbeat; `None` before the first one, and while the heartbeat is lost.
     state: Option<State>,
@@ -48,7 +48,7 @@ pub struct Monitored {
 
 impl Monitored {
     const fn new(watch: Option<Watch>) -> Monitored {
-        Monitored { watch, due: Instant::NEVER, is_lost: false, state: None }
+        Monitored { watch, due: Tick::NEVER, is_lost: false, state: None }
     }
 }
 
@@ -61,6 +61,11 @@ pub(crate) struct Consumer<E> {
 impl<E: Array<Monitored>> Consumer<E> {
     pub(crate) fn new() -> Consumer<E> {
         Consumer { entries: E::filled(|| Monitored::new(None)) }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.entries.as_mut().iter_mut().for_each(|entry| entry.due.shift(by));
     }
 
     /// Sets an entry of 1016h, from 0, and restarts its monitoring. Returns whether the old node of the entry was lost.
@@ -88,14 +93,14 @@ impl<E: Array<Monitored>> Consumer<E> {
     pub(crate) fn take(
         &mut self,
         frame: &Frame,
-        now: Instant,
+        now: Tick,
         changed: impl FnOnce(NodeId, State),
     ) -> Option<Change> {
         let &[code] = frame.data() else { return None };
         let state = State::from_code(code);
         for (number, entry) in (0..).zip(self.entries.as_mut()) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
-                entry.due = now.plus(Duration::from_millis(watch.period.into()));
+                entry.due = now.plus(Span::from_millis(watch.period));
                 let before = core::mem::replace(&mut entry.state, state);
                 if let Some(state) =
                     state.filter(|state| before != Some(*state) || *state == State::Initialising)
@@ -120,14 +125,14 @@ impl<E: Array<Monitored>> Consumer<E> {
     }
 
     /// The next instant at which a heartbeat is missing.
-    pub(crate) fn due(&self) -> Instant {
-        self.entries.as_ref().iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
+    pub(crate) fn due(&self) -> Tick {
+        self.entries.as_ref().iter().fold(Tick::NEVER, |due, entry| due.min(entry.due))
     }
 
     /// Reports one missing heartbeat. Must be called until the result is `None`.
-    pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
+    pub(crate) fn expire(&mut self, now: Tick) -> Option<Change> {
         let (number, entry) = (0..).zip(self.entries.as_mut()).find(|(_, entry)| now >= entry.due)?;
-        (entry.due, entry.is_lost, entry.state) = (Instant::NEVER, true, None);
+        (entry.due, entry.is_lost, entry.state) = (Tick::NEVER, true, None);
         Some(Change::Lost(number))
     }
 }

@@ -2,7 +2,7 @@
 //! and notices when they stay away.
 
 use crate::nmt::State;
-use crate::{Duration, Instant};
+use crate::{Span, Tick};
 
 /// The bit that alternates from answer to answer.
 const TOGGLE: u8 = 0x80;
@@ -13,13 +13,20 @@ pub(crate) struct Guarding {
     toggle: u8,
     /// Guard time (100Ch) times life time factor (100Dh) in ms; 0 for no life guarding.
     life_time: u32,
-    due: Instant,
+    /// What follows after `due` of the present life time, in ms: a life time can be longer than a span.
+    rest: u32,
+    due: Tick,
     is_lost: bool,
 }
 
 impl Guarding {
     pub(crate) const fn new() -> Guarding {
-        Guarding { toggle: 0, life_time: 0, due: Instant::NEVER, is_lost: false }
+        Guarding { toggle: 0, life_time: 0, rest: 0, due: Tick::NEVER, is_lost: false }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.due.shift(by);
     }
 
     /// At a reset: the first answer has the toggle bit 0, and life guarding begins with it.
@@ -30,30 +37,40 @@ impl Guarding {
     /// Takes the values of 100Ch and 100Dh. Life guarding begins with the next remote frame. Returns whether the master
     /// was lost.
     pub(crate) fn configure(&mut self, guard_time: u16, factor: u8) -> bool {
-        (self.life_time, self.due) = (u32::from(guard_time) * u32::from(factor), Instant::NEVER);
+        (self.life_time, self.due) = (u32::from(guard_time) * u32::from(factor), Tick::NEVER);
         core::mem::take(&mut self.is_lost)
     }
 
     /// Takes a remote frame. Returns the answer, and whether the master is back.
-    pub(crate) fn answer(&mut self, state: State, now: Instant) -> (u8, bool) {
+    pub(crate) fn answer(&mut self, state: State, now: Tick) -> (u8, bool) {
         let answer = state.code() | self.toggle;
         self.toggle ^= TOGGLE;
-        let life_time = Duration::from_millis(self.life_time.into());
-        self.due = if life_time.is_zero() { Instant::NEVER } else { now.plus(life_time) };
+        self.rest = self.life_time;
+        self.due = self.next_part(now);
         (answer, core::mem::take(&mut self.is_lost))
     }
 
-    /// When the next remote frame is missing.
-    pub(crate) fn due(&self) -> Instant {
+    /// The end of the next part of the life time; `NEVER` when nothing is left of it.
+    fn next_part(&mut self, now: Tick) -> Tick {
+        let part = u16::try_from(self.rest).unwrap_or(u16::MAX);
+        self.rest -= u32::from(part);
+        if part == 0 { Tick::NEVER } else { now.plus(Span::from_millis(part)) }
+    }
+
+    /// When the next remote frame is missing, or a part of a long life time is over.
+    pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
     /// Whether the master is lost. Reported once.
-    pub(crate) fn expire(&mut self, now: Instant) -> bool {
-        let is_lost = now >= self.due;
-        if is_lost {
-            (self.due, self.is_lost) = (Instant::NEVER, true);
+    pub(crate) fn expire(&mut self, now: Tick) -> bool {
+        while now >= self.due {
+            self.due = self.next_part(self.due);
+            if self.due == Tick::NEVER {
+                self.is_lost = true;
+                return true;
+            }
         }
-        is_lost
+        false
     }
 }

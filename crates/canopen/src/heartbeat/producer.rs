@@ -2,32 +2,37 @@
 
 use crate::nmt::State;
 use crate::transmit::{Context, RETRY};
-use crate::{CanId, Duration, Frame, Instant, Transmit};
+use crate::{CanId, Frame, Span, Tick, Transmit};
 
 /// Sends one boot-up message, then a heartbeat every period (1017h).
 #[derive(Debug)]
 pub(crate) struct Producer {
     /// Producer heartbeat time in ms; 0 for no heartbeat.
     period: u16,
-    due: Instant,
+    due: Tick,
     boot_up: bool,
 }
 
 impl Producer {
     pub(crate) const fn new() -> Producer {
-        Producer { period: 0, due: Instant::NEVER, boot_up: false }
+        Producer { period: 0, due: Tick::NEVER, boot_up: false }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.due.shift(by);
     }
 
     /// Makes the boot-up message due at once. It counts as the first heartbeat.
-    pub(crate) fn boot_up(&mut self, period: u16, now: Instant) {
+    pub(crate) fn boot_up(&mut self, period: u16, now: Tick) {
         *self = Producer { period, due: now, boot_up: true };
     }
 
     /// Changes the period, and sends the next heartbeat at once; 0 switches the heartbeat off.
-    pub(crate) fn set_period(&mut self, period: u16, now: Instant) {
+    pub(crate) fn set_period(&mut self, period: u16, now: Tick) {
         self.period = period;
         if !self.boot_up {
-            self.due = if period == 0 { Instant::NEVER } else { now };
+            self.due = if period == 0 { Tick::NEVER } else { now };
         }
     }
 
@@ -42,16 +47,16 @@ impl Producer {
     }
 
     /// When the next message is due.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
     /// The latest instant at which a consumer with a time of 1.5 periods still expects the next heartbeat.
-    pub(crate) fn latest(&self) -> Instant {
+    pub(crate) fn latest(&self) -> Tick {
         match self.due {
-            _ if self.boot_up => Instant(0),
-            Instant::NEVER => Instant::NEVER,
-            due => due.plus(Duration::from_millis(u64::from(self.period) / 2)),
+            _ if self.boot_up => Tick(0),
+            Tick::NEVER => Tick::NEVER,
+            due => due.plus(Span::from_millis(self.period / 2)),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Fastscan: the master finds the identity of an unconfigured slave bit by bit. All slaves answer with the same frame.
 
-use super::{Identity, Part, Request};
+use super::{Request, word};
 
 /// State of a scan: the number of the part of the identity that is compared next.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,15 +20,19 @@ pub(super) enum Step {
 }
 
 impl Fastscan {
-    /// Takes a step. `bit` is the lowest bit that is compared.
-    pub(super) fn step(&mut self, identity: &Identity, value: u32, bit: u8, part: u8, next: u8) -> Step {
+    /// Takes the frame of a step.
+    pub(super) fn step(&mut self, frame: [u8; 8], identity: impl Fn(u8) -> u32) -> Step {
+        // The lowest bit that is compared, its part, and the part to compare next.
+        let [.., bit, part, next] = frame;
+        if part > 3 || next > 3 || bit > 31 && bit != Request::CONFIRM {
+            return Step::Silent;
+        }
         if bit == Request::CONFIRM {
             self.part = 0;
             return Step::Match;
         }
-        let own = Part::numbered(part).filter(|_| part == self.part).map(|part| identity.part(part));
-        let mask = u32::MAX.checked_shl(bit.into()).unwrap_or(0);
-        if own.is_none_or(|own| (own ^ value) & mask != 0) {
+        let mask = u32::MAX << (bit & 31);
+        if part != self.part || (identity(part) ^ word(frame)) & mask != 0 {
             return Step::Silent;
         }
         self.part = next;

@@ -80,7 +80,7 @@ const fn word(frame: [u8; 8]) -> u32 {
 }
 
 /// The data of a frame with a command specifier and a number.
-const fn frame_of_word(command: u8, value: u32) -> [u8; 8] {
+pub(crate) const fn frame_of_word(command: u8, value: u32) -> [u8; 8] {
     let [a, b, c, d] = value.to_le_bytes();
     [command, a, b, c, d, 0, 0, 0]
 }

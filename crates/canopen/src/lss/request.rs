@@ -78,9 +78,18 @@ impl Bound {
     ];
 }
 
-const SELECT: u8 = 0x40;
-const IDENTIFY: u8 = 0x46;
-const INQUIRE: u8 = 0x5A;
+/// Command specifiers. The messages of a series follow each other.
+pub(super) const SWITCH_GLOBAL: u8 = 0x04;
+pub(super) const NODE_ID: u8 = 0x11;
+pub(super) const BIT_TIMING: u8 = 0x13;
+pub(super) const ACTIVATE: u8 = 0x15;
+pub(super) const STORE: u8 = 0x17;
+pub(super) const SELECT: u8 = 0x40;
+pub(super) const IDENTIFY: u8 = 0x46;
+pub(super) const IDENTIFY_UNCONFIGURED: u8 = 0x4C;
+pub(super) const FASTSCAN: u8 = 0x51;
+pub(super) const INQUIRE: u8 = 0x5A;
+pub(super) const INQUIRE_NODE_ID: u8 = 0x5E;
 
 impl Request {
     /// Value of `bit` in a fastscan request that asks whether there is any unconfigured slave.
@@ -92,17 +101,17 @@ impl Request {
         let [command, first, second, ..] = frame;
         let value = word(frame);
         Some(match command {
-            0x04 if first <= 1 => Request::SwitchGlobal { configuration: first == 1 },
-            0x11 => Request::NodeId(first),
-            0x13 => Request::BitTiming { table: first, index: second },
-            0x15 => Request::Activate { delay: u16::from_le_bytes([first, second]) },
-            0x17 => Request::Store,
+            SWITCH_GLOBAL if first <= 1 => Request::SwitchGlobal { configuration: first == 1 },
+            NODE_ID => Request::NodeId(first),
+            BIT_TIMING => Request::BitTiming { table: first, index: second },
+            ACTIVATE => Request::Activate { delay: u16::from_le_bytes([first, second]) },
+            STORE => Request::Store,
             SELECT..=0x43 => Request::Select(Part::numbered(command - SELECT)?, value),
             IDENTIFY..=0x4B => Request::Identify(*Bound::ALL.get(usize::from(command - IDENTIFY))?, value),
-            0x4C => Request::IdentifyUnconfigured,
-            0x51 => fastscan(frame)?,
+            IDENTIFY_UNCONFIGURED => Request::IdentifyUnconfigured,
+            FASTSCAN => fastscan(frame)?,
             INQUIRE..=0x5D => Request::Inquire(Part::numbered(command - INQUIRE)?),
-            0x5E => Request::InquireNodeId,
+            INQUIRE_NODE_ID => Request::InquireNodeId,
             _ => return None,
         })
     }
@@ -111,20 +120,20 @@ impl Request {
     #[must_use]
     pub const fn encode(self) -> [u8; 8] {
         match self {
-            Request::SwitchGlobal { configuration } => [0x04, configuration as u8, 0, 0, 0, 0, 0, 0],
+            Request::SwitchGlobal { configuration } => [SWITCH_GLOBAL, configuration as u8, 0, 0, 0, 0, 0, 0],
             Request::Select(part, value) => frame_of_word(SELECT + part.number(), value),
-            Request::NodeId(id) => [0x11, id, 0, 0, 0, 0, 0, 0],
-            Request::BitTiming { table, index } => [0x13, table, index, 0, 0, 0, 0, 0],
-            Request::Activate { delay } => frame_of_word(0x15, delay as u32),
-            Request::Store => [0x17, 0, 0, 0, 0, 0, 0, 0],
+            Request::NodeId(id) => [NODE_ID, id, 0, 0, 0, 0, 0, 0],
+            Request::BitTiming { table, index } => [BIT_TIMING, table, index, 0, 0, 0, 0, 0],
+            Request::Activate { delay } => frame_of_word(ACTIVATE, delay as u32),
+            Request::Store => [STORE, 0, 0, 0, 0, 0, 0, 0],
             Request::Identify(bound, value) => frame_of_word(IDENTIFY + bound as u8, value),
-            Request::IdentifyUnconfigured => [0x4C, 0, 0, 0, 0, 0, 0, 0],
+            Request::IdentifyUnconfigured => [IDENTIFY_UNCONFIGURED, 0, 0, 0, 0, 0, 0, 0],
             Request::Fastscan { value, bit, part, next } => {
                 let [a, b, c, d] = value.to_le_bytes();
-                [0x51, a, b, c, d, bit, part, next]
+                [FASTSCAN, a, b, c, d, bit, part, next]
             }
             Request::Inquire(part) => [INQUIRE + part.number(), 0, 0, 0, 0, 0, 0, 0],
-            Request::InquireNodeId => [0x5E, 0, 0, 0, 0, 0, 0, 0],
+            Request::InquireNodeId => [INQUIRE_NODE_ID, 0, 0, 0, 0, 0, 0, 0],
         }
     }
 }

@@ -1,6 +1,12 @@
 //! Responses of an LSS slave.
 
+use super::request::{BIT_TIMING, INQUIRE, INQUIRE_NODE_ID, NODE_ID, STORE};
 use super::{Part, frame_of_word, word};
+
+/// Command specifiers of the responses that differ from those of their requests.
+pub(super) const SELECTED: u8 = 0x44;
+pub(super) const IDENTIFIED: u8 = 0x4F;
+pub(super) const UNCONFIGURED: u8 = 0x50;
 
 /// A response of an LSS slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,14 +35,14 @@ impl Response {
     pub fn parse(frame: [u8; 8]) -> Option<Response> {
         let [command, code, ..] = frame;
         Some(match command {
-            0x11 => Response::NodeId(code),
-            0x13 => Response::BitTiming(code),
-            0x17 => Response::Stored(code),
-            0x44 => Response::Selected,
-            0x4F => Response::Identified,
-            0x50 => Response::Unconfigured,
-            0x5A..=0x5D => Response::Identity(Part::numbered(command - 0x5A)?, word(frame)),
-            0x5E => Response::NodeIdIs(code),
+            NODE_ID => Response::NodeId(code),
+            BIT_TIMING => Response::BitTiming(code),
+            STORE => Response::Stored(code),
+            SELECTED => Response::Selected,
+            IDENTIFIED => Response::Identified,
+            UNCONFIGURED => Response::Unconfigured,
+            INQUIRE..=0x5D => Response::Identity(Part::numbered(command - INQUIRE)?, word(frame)),
+            INQUIRE_NODE_ID => Response::NodeIdIs(code),
             _ => return None,
         })
     }
@@ -45,14 +51,14 @@ impl Response {
     #[must_use]
     pub const fn encode(self) -> [u8; 8] {
         let (command, value) = match self {
-            Response::Selected => (0x44, 0),
-            Response::NodeId(code) => (0x11, code as u32),
-            Response::BitTiming(code) => (0x13, code as u32),
-            Response::Stored(code) => (0x17, code as u32),
-            Response::Identified => (0x4F, 0),
-            Response::Unconfigured => (0x50, 0),
-            Response::Identity(part, value) => (0x5A + part.number(), value),
-            Response::NodeIdIs(id) => (0x5E, id as u32),
+            Response::Selected => (SELECTED, 0),
+            Response::NodeId(code) => (NODE_ID, code as u32),
+            Response::BitTiming(code) => (BIT_TIMING, code as u32),
+            Response::Stored(code) => (STORE, code as u32),
+            Response::Identified => (IDENTIFIED, 0),
+            Response::Unconfigured => (UNCONFIGURED, 0),
+            Response::Identity(part, value) => (INQUIRE + part.number(), value),
+            Response::NodeIdIs(id) => (INQUIRE_NODE_ID, id as u32),
         };
         frame_of_word(command, value)
     }

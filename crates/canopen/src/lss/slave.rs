@@ -1,8 +1,8 @@
 //! The LSS slave: selects the requests for this device, and decides on the reaction.
 
 use super::fastscan::{Fastscan, Step};
-use super::{BitRate, Bound, Identity, Part, Request, Response};
-use crate::{Duration, NodeId};
+use super::{BitRate, Bound, Part, request, response, word};
+use crate::{NodeId, Span};
 
 /// Node-ID and bit rate that take effect later: with the next reset communication, activation or start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,8 @@ pub struct Configuration {
 pub(crate) enum Outcome {
     /// No response.
     Silence,
-    Answer(Response),
+    /// A response: its command specifier and its value.
+    Answer(u8, u32),
     /// A device without a node-ID has received one: it boots up.
     BootUp,
     /// The bit rate changes.
@@ -37,8 +38,8 @@ pub(crate) struct Switch {
 }
 
 impl Switch {
-    pub(crate) fn delay(self) -> Duration {
-        Duration::from_millis(self.delay.into())
+    pub(crate) fn delay(self) -> Span {
+        Span::from_millis(self.delay)
     }
 }
 
@@ -81,43 +82,50 @@ impl Slave {
         *self = Slave::new(self.pending);
     }
 
-    /// Takes a request. `node_id` is the node-ID in use.
-    pub(crate) fn take(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
-        match request {
-            Request::SwitchGlobal { configuration } => self.switch(configuration, node_id),
-            Request::Select(part, value) => self.select(part, value, identity),
-            Request::Identify(bound, value) => self.identify(bound, value, identity),
-            Request::IdentifyUnconfigured if self.is_unconfigured(node_id) => {
-                Outcome::Answer(Response::Unconfigured)
+    /// Takes a request: a frame that [`Request::parse`](super::Request::parse) would accept. `node_id` is the node-ID in
+    /// use, `identity` gives a part of the identity.
+    // The commands are matched here, and not first converted to a request: it takes half of the code.
+    pub(crate) fn take(
+        &mut self,
+        frame: [u8; 8],
+        identity: impl Fn(u8) -> u32,
+        node_id: Option<NodeId>,
+    ) -> Outcome {
+        let [command, first, second, ..] = frame;
+        let value = word(frame);
+        match command {
+            request::SWITCH_GLOBAL if first <= 1 => self.switch(first == 1, node_id),
+            request::SELECT..=0x43 => {
+                let part = command - request::SELECT;
+                self.select(part, value == identity(part))
             }
-            Request::Fastscan { value, bit, part, next } if self.is_scanned(node_id) => {
-                self.fastscan(identity, value, bit, part, next)
+            request::IDENTIFY..=0x4B => {
+                let bound = command - request::IDENTIFY;
+                self.identify(bound, is_within(bound, value, &identity))
             }
-            _ if self.is_selected => self.configure(request, identity, node_id),
-            _ => Outcome::Silence,
-        }
-    }
-
-    /// Takes a request to the selected slave.
-    fn configure(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
-        match request {
-            Request::NodeId(id) => Outcome::Answer(Response::NodeId(self.set_node_id(id))),
-            Request::BitTiming { table, index } => {
-                Outcome::Answer(Response::BitTiming(self.set_bit_rate(table, index)))
+            request::IDENTIFY_UNCONFIGURED if self.is_unconfigured(node_id) => {
+                Outcome::Answer(response::UNCONFIGURED, 0)
             }
-            Request::Activate { delay } => Outcome::Switch(Switch { bit_rate: self.pending.bit_rate, delay }),
-            Request::Store => Outcome::Store(self.pending),
-            Request::Inquire(part) => Outcome::Answer(Response::Identity(part, identity.part(part))),
-            Request::InquireNodeId => {
-                Outcome::Answer(Response::NodeIdIs(node_id.map_or(u8::MAX, NodeId::get)))
+            request::FASTSCAN if !self.is_selected && self.is_unconfigured(node_id) => {
+                self.fastscan(frame, identity)
             }
+            _ if !self.is_selected => Outcome::Silence,
+            request::NODE_ID => Outcome::Answer(command, self.set_node_id(first).into()),
+            request::BIT_TIMING => Outcome::Answer(command, self.set_bit_rate(first, second).into()),
+            request::ACTIVATE => Outcome::Switch(Switch {
+                bit_rate: self.pending.bit_rate,
+                delay: u16::from_le_bytes([first, second]),
+            }),
+            request::STORE => Outcome::Store(self.pending),
+            request::INQUIRE..=0x5D => Outcome::Answer(command, identity(command - request::INQUIRE)),
+            request::INQUIRE_NODE_ID => Outcome::Answer(command, node_id.map_or(u8::MAX, NodeId::get).into()),
             _ => Outcome::Silence,
         }
     }
 
     /// The response after an attempt to store the configuration.
-    pub(crate) fn stored(good: bool) -> Response {
-        Response::Stored(if good { OK } else { MEMORY })
+    pub(crate) fn stored(good: bool) -> (u8, u32) {
+        (request::STORE, if good { OK } else { MEMORY }.into())
     }
 
     /// Switches the state. A device that has received its first node-ID uses it when the master switches back to
@@ -129,46 +137,33 @@ impl Slave {
         if boots_up { Outcome::BootUp } else { Outcome::Silence }
     }
 
-    fn select(&mut self, part: Part, value: u32, identity: &Identity) -> Outcome {
-        let matches = !self.is_selected && value == identity.part(part);
-        self.selected = advance(self.selected, part.number(), matches);
+    fn select(&mut self, part: u8, matches: bool) -> Outcome {
+        self.selected = advance(self.selected, part, matches && !self.is_selected);
         if usize::from(self.selected) < Part::ALL.len() {
             return Outcome::Silence;
         }
         (self.selected, self.is_selected) = (0, true);
-        Outcome::Answer(Response::Selected)
+        Outcome::Answer(response::SELECTED, 0)
     }
 
-    fn identify(&mut self, bound: Bound, value: u32, identity: &Identity) -> Outcome {
-        let matches = match bound {
-            Bound::Vendor => value == identity.vendor,
-            Bound::Product => value == identity.product,
-            Bound::RevisionLow => value <= identity.revision,
-            Bound::RevisionHigh => value >= identity.revision,
-            Bound::SerialLow => value <= identity.serial,
-            Bound::SerialHigh => value >= identity.serial,
-        };
-        self.identified = advance(self.identified, bound as u8, matches);
+    fn identify(&mut self, bound: u8, matches: bool) -> Outcome {
+        self.identified = advance(self.identified, bound, matches);
         if usize::from(self.identified) < Bound::ALL.len() {
             return Outcome::Silence;
         }
         self.identified = 0;
-        Outcome::Answer(Response::Identified)
+        Outcome::Answer(response::IDENTIFIED, 0)
     }
 
     fn is_unconfigured(&self, node_id: Option<NodeId>) -> bool {
         node_id.is_none() && self.pending.node_id.is_none()
     }
 
-    /// Whether the slave takes part in a fastscan. A slave that has been found already does not.
-    fn is_scanned(&self, node_id: Option<NodeId>) -> bool {
-        !self.is_selected && self.is_unconfigured(node_id)
-    }
-
-    fn fastscan(&mut self, identity: &Identity, value: u32, bit: u8, part: u8, next: u8) -> Outcome {
-        let step = self.scan.step(identity, value, bit, part, next);
+    /// A slave that has been found already takes no part in the scan.
+    fn fastscan(&mut self, frame: [u8; 8], identity: impl Fn(u8) -> u32) -> Outcome {
+        let step = self.scan.step(frame, identity);
         self.is_selected = step == Step::Found;
-        if step == Step::Silent { Outcome::Silence } else { Outcome::Answer(Response::Identified) }
+        if step == Step::Silent { Outcome::Silence } else { Outcome::Answer(response::IDENTIFIED, 0) }
     }
 
     fn set_node_id(&mut self, id: u8) -> u8 {
@@ -184,6 +179,16 @@ impl Slave {
         let Some(bit_rate) = BitRate::from_index(index).filter(|_| table == 0) else { return REFUSED };
         self.pending.bit_rate = bit_rate;
         OK
+    }
+}
+
+/// Whether a value is the vendor-ID or the product code, or a bound of the revision or the serial number that includes
+/// the own one. The bounds have the order of [`Bound::ALL`].
+fn is_within(bound: u8, value: u32, identity: impl Fn(u8) -> u32) -> bool {
+    match bound {
+        0 | 1 => value == identity(bound),
+        2 | 4 => value <= identity(bound / 2 + 1),
+        _ => value >= identity(bound / 2 + 1),
     }
 }
 

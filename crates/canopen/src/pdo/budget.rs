@@ -8,7 +8,7 @@
 //! A burst leaves the bus to the services again after 36 ms and the time of four PDOs at most, 90 ms at 10 kbit/s.
 
 use crate::transmit::RETRY;
-use crate::{Duration, Instant};
+use crate::{Span, Tick};
 
 /// The share: `SHARE` / 4 of the bus.
 const SHARE: u32 = 3;
@@ -18,7 +18,7 @@ const BURST: u32 = 12_000;
 const FULL_AFTER: u32 = 50_000;
 const _: () = assert!(limit(10) <= FULL_AFTER * 10 * SHARE / 4, "the credit is full");
 /// A claim that is not renewed has ended: a waiting PDO tries again each millisecond.
-const CLAIM: Duration = Duration(3 * RETRY.0);
+const CLAIM: Span = Span(3 * RETRY.0);
 
 /// Credit that is enough for any PDO; a power of two, which one instruction compares.
 const ENOUGH: u32 = 1 << 18;
@@ -34,11 +34,11 @@ pub(crate) struct Budget {
     /// The CAN-ID of the PDO with the first claim.
     claimant: u16,
     /// The end of the claim.
-    claim_end: Instant,
+    claim_end: Tick,
     credit: u32,
     /// The credit with which a PDO is admitted without a look at the claim; out of reach while there is one.
     enough: u32,
-    refilled: Instant,
+    refilled: Tick,
     /// The credit after the last refill.
     after_refill: u32,
     /// The cost of the PDOs that may be unsent without foreign frames on the bus.
@@ -51,13 +51,19 @@ impl Budget {
         Budget {
             kbit,
             claimant: 0,
-            claim_end: Instant(0),
+            claim_end: Tick(0),
             credit: limit(kbit),
             enough: ENOUGH,
-            refilled: Instant(0),
+            refilled: Tick(0),
             after_refill: limit(kbit),
             unsent: 0,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.claim_end.shift(by);
+        self.refilled.shift(by);
     }
 
     /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.
@@ -67,7 +73,7 @@ impl Budget {
 
     /// A call of the device begins. `is_waiting`: whether a PDO that was queued before waits for the bus.
     #[inline]
-    pub(crate) fn begin(&mut self, now: Instant, is_waiting: impl FnOnce() -> bool) {
+    pub(crate) fn begin(&mut self, now: Tick, is_waiting: impl FnOnce() -> bool) {
         if self.credit < PLENTY {
             self.refill(now, is_waiting());
         }
@@ -75,19 +81,19 @@ impl Budget {
 
     /// Whether the PDO with this CAN-ID and number of bytes may be sent now.
     #[inline]
-    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Instant) -> bool {
+    pub(crate) fn admits(&mut self, id: u16, len: usize, now: Tick) -> bool {
         self.credit >= self.enough || self.admits_scarce(id, len, now)
     }
 
     #[inline(never)]
-    fn admits_scarce(&mut self, id: u16, len: usize, now: Instant) -> bool {
+    fn admits_scarce(&mut self, id: u16, len: usize, now: Tick) -> bool {
         if self.claimant != id && self.claim_end > now {
             return false;
         }
         let is_admitted = self.credit >= cost(len) || self.kbit == 0;
         self.claimant = id;
         (self.claim_end, self.enough) =
-            if is_admitted { (Instant(0), ENOUGH) } else { (now.plus(CLAIM), u32::MAX) };
+            if is_admitted { (Tick(0), ENOUGH) } else { (now.plus(CLAIM), u32::MAX) };
         is_admitted
     }
 
@@ -99,9 +105,8 @@ impl Budget {
     /// Earns credit for the time since the last refill. A PDO that still waits, although the bus had the time for it, shows
     /// that others hold the bus. Then nothing is earned: the PDOs leave the next gaps to less urgent frames.
     #[inline(never)]
-    fn refill(&mut self, now: Instant, is_waiting: bool) {
-        let elapsed =
-            u32::try_from(now.0.saturating_sub(self.refilled.0)).unwrap_or(FULL_AFTER).min(FULL_AFTER);
+    fn refill(&mut self, now: Tick, is_waiting: bool) {
+        let elapsed = now.0.saturating_sub(self.refilled.0).min(FULL_AFTER);
         let passed = elapsed * u32::from(self.kbit);
         let spent = self.after_refill.saturating_sub(self.credit);
         self.unsent = (self.unsent + spent).saturating_sub(passed);
@@ -135,9 +140,9 @@ mod tests {
         let mut budget = Budget::new(kbit);
         let mut frames = [0; 8];
         for ms in 0..10_000 {
-            budget.begin(Instant(ms * 1000), || false);
+            budget.begin(Tick(ms * 1000), || false);
             for (id, count) in (0x181..).zip(&mut frames) {
-                if budget.admits(id, 8, Instant(ms * 1000)) {
+                if budget.admits(id, 8, Tick(ms * 1000)) {
                     budget.spend(8);
                     *count += 1;
                 }
@@ -172,12 +177,12 @@ mod tests {
     fn on_a_bus_that_others_hold_gaps_are_left() {
         for kbit in RATES {
             let (mut budget, mut free_at, mut waiting) = (Budget::new(kbit), 0, 0);
-            let span = u64::from(135_000 * 5 / 2 / u32::from(kbit));
+            let span = 135_000 * 5 / 2 / u32::from(kbit);
             for ms in 0..10_000 {
                 let now = ms * 1000;
-                budget.begin(Instant(now), || now < free_at);
+                budget.begin(Tick(now), || now < free_at);
                 for id in 0x181..0x189 {
-                    if budget.admits(id, 8, Instant(now)) {
+                    if budget.admits(id, 8, Tick(now)) {
                         budget.spend(8);
                         free_at = free_at.max(now) + span;
                     }
@@ -194,22 +199,22 @@ mod tests {
     #[test]
     fn an_instant_before_the_last_refill_earns_nothing() {
         let mut budget = Budget::new(10);
-        budget.begin(Instant(1_000_000), || false);
-        while budget.admits(0x181, 8, Instant(1_000_000)) {
+        budget.begin(Tick(1_000_000), || false);
+        while budget.admits(0x181, 8, Tick(1_000_000)) {
             budget.spend(8);
         }
-        budget.begin(Instant(999_999), || false);
-        assert!(!budget.admits(0x181, 8, Instant(999_999)));
+        budget.begin(Tick(999_999), || false);
+        assert!(!budget.admits(0x181, 8, Tick(999_999)));
     }
 
     #[test]
     fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Instant(0)) {
+        while budget.admits(0x181, 8, Tick(0)) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x281, 8, Instant(2_000)), "181h has the claim");
-        budget.begin(Instant(40_000), || false);
-        assert!(budget.admits(0x281, 8, Instant(40_000)), "the claim of 181h has ended");
+        assert!(!budget.admits(0x281, 8, Tick(2_000)), "181h has the claim");
+        budget.begin(Tick(40_000), || false);
+        assert!(budget.admits(0x281, 8, Tick(40_000)), "the claim of 181h has ended");
     }
 }

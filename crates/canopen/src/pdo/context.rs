@@ -1,11 +1,11 @@
 //! One call of the device for its process data.
 
 use super::Budget;
-use crate::{Frame, Instant, Transmit};
+use crate::{Frame, Tick, Transmit};
 
 /// One call of the device for its process data, which have a share of the bus.
 pub(crate) struct ProcessContext<'a, T> {
-    pub(crate) now: Instant,
+    pub(crate) now: Tick,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
     pub(crate) budget: &'a mut Budget,

@@ -6,7 +6,7 @@
 use super::{Content, Layout, Links};
 use crate::dictionary::{Addressing, Transmission};
 use crate::emcy::Fault;
-use crate::{CanId, Duration, Frame, Instant};
+use crate::{CanId, Frame, Span, Tick};
 
 /// Settings of a valid RPDO, from the objects 1400h.. and 1600h.. .
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +87,7 @@ pub struct Rpdo {
     /// The newest data that waits for a SYNC.
     waiting: Option<[u8; 8]>,
     /// When the next frame is missing; `NEVER` before the first reception.
-    due: Instant,
+    due: Tick,
     /// The active faults, one bit for each [`RpdoFault`].
     faults: u8,
 }
@@ -100,9 +100,14 @@ impl Rpdo {
             is_valid: false,
             settings: RpdoSettings::UNUSED,
             waiting: None,
-            due: Instant::NEVER,
+            due: Tick::NEVER,
             faults: 0,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.due.shift(by);
     }
 
     /// Whether the data waits for a SYNC.
@@ -124,7 +129,7 @@ impl Rpdo {
 
     /// Discards waiting data and the deadline, when the NMT state changes.
     pub(crate) fn stop(&mut self) {
-        (self.waiting, self.due) = (None, Instant::NEVER);
+        (self.waiting, self.due) = (None, Tick::NEVER);
     }
 
     /// The CAN-ID of a valid RPDO.
@@ -140,15 +145,15 @@ impl Rpdo {
     /// Takes a data frame of this RPDO. Returns the result of the reception, and whether the data is valid at once.
     /// `late` is true when the synchronous window is over: a synchronous RPDO is then ignored.
     #[inline]
-    pub(crate) fn take(&mut self, frame: &Frame, now: Instant, late: bool) -> (Reception, bool) {
+    pub(crate) fn take(&mut self, frame: &Frame, now: Tick, late: bool) -> (Reception, bool) {
         let settings = &self.settings;
         let mapped = settings.len();
         if frame.len() < mapped {
             return (Reception::TooShort, false);
         }
         self.due = match settings.deadline {
-            0 => Instant::NEVER,
-            deadline => now.plus(Duration::from_millis(deadline.into())),
+            0 => Tick::NEVER,
+            deadline => now.plus(Span::from_millis(deadline)),
         };
         let reception = if frame.len() == mapped { Reception::Complete } else { Reception::TooLong };
         match (&settings.content, settings.is_synchronous) {
@@ -211,15 +216,15 @@ impl Rpdo {
     }
 
     /// When the next frame is missing.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
     /// Whether the deadline has passed. Reported once.
-    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+    pub(crate) fn expire(&mut self, now: Tick) -> bool {
         let is_over = now >= self.due;
         if is_over {
-            self.due = Instant::NEVER;
+            self.due = Tick::NEVER;
         }
         is_over
     }

@@ -10,7 +10,7 @@ use crate::array::Array;
 use crate::dictionary::{Addressing, Field};
 use crate::sdo::Multiplexer;
 use crate::transmit::RETRY;
-use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
+use crate::{CanId, Frame, NodeId, Span, Tick, Transmit};
 
 /// Settings of the multiplexed TPDO, from the dictionary.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,10 +96,10 @@ pub(crate) struct Scanner<L> {
     watched: List<L>,
     /// Whether any object waits to be sent.
     is_pending: bool,
-    event_due: Instant,
+    event_due: Tick,
     /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
-    sent: Instant,
-    inhibited_until: Instant,
+    sent: Tick,
+    inhibited_until: Tick,
 }
 
 impl<L: Array<Watched>> Scanner<L> {
@@ -108,10 +108,17 @@ impl<L: Array<Watched>> Scanner<L> {
             settings: None,
             watched: List { memory: L::filled(|| Watched::UNUSED), len: 0 },
             is_pending: false,
-            event_due: Instant::NEVER,
-            sent: Instant::NEVER,
-            inhibited_until: Instant(0),
+            event_due: Tick::NEVER,
+            sent: Tick::NEVER,
+            inhibited_until: Tick(0),
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.event_due.shift(by);
+        self.sent.shift(by);
+        self.inhibited_until.shift(by);
     }
 
     /// Whether the present settings are equal to these.
@@ -178,24 +185,24 @@ impl<L: Array<Watched>> Scanner<L> {
     /// Discards everything that waits, on leaving Operational. The inhibit time continues.
     pub(crate) fn stop(&mut self) {
         self.watched.iter_mut().for_each(|watched| watched.is_pending = false);
-        (self.is_pending, self.event_due) = (false, Instant::NEVER);
+        (self.is_pending, self.event_due) = (false, Tick::NEVER);
         self.inhibited_until = self.inhibit_end();
     }
 
     /// At a reset: the inhibit time does not outlast the next `stop`.
     pub(crate) fn forget_sent(&mut self) {
-        self.sent = Instant::NEVER;
+        self.sent = Tick::NEVER;
     }
 
-    fn inhibit_end(&self) -> Instant {
+    fn inhibit_end(&self) -> Tick {
         match (self.sent, &self.settings) {
-            (Instant::NEVER, _) | (_, None) => Instant(0),
-            (sent, Some(settings)) => sent.plus(Duration::from_inhibit(settings.inhibit)),
+            (Tick::NEVER, _) | (_, None) => Tick(0),
+            (sent, Some(settings)) => sent.plus(Span::from_inhibit(settings.inhibit)),
         }
     }
 
     /// When the next frame or the event timer is due.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         if self.is_pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
     }
 
@@ -218,8 +225,8 @@ impl<L: Array<Watched>> Scanner<L> {
         if elapsed {
             self.send_all();
         }
-        if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {
-            self.event_due = context.now.plus(Duration::from_millis(settings.event.into()));
+        if elapsed || self.is_pending && settings.event != 0 && self.event_due == Tick::NEVER {
+            self.event_due = context.now.plus(Span::from_millis(settings.event));
         }
         if !self.is_pending {
             return;
@@ -238,7 +245,7 @@ impl<L: Array<Watched>> Scanner<L> {
             (watched.sent, watched.is_pending) = (Some(data), false);
             self.sent = context.now;
             if settings.inhibit != 0 {
-                self.inhibited_until = context.now.plus(Duration::from_inhibit(settings.inhibit));
+                self.inhibited_until = context.now.plus(Span::from_inhibit(settings.inhibit));
             }
         }
         self.is_pending = false;

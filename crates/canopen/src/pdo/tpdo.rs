@@ -11,7 +11,7 @@ use super::{Layout, Links, ProcessContext};
 use crate::dictionary::Transmission;
 use crate::sync::Sync;
 use crate::transmit::RETRY;
-use crate::{CanId, Duration, Frame, Instant, Transmit};
+use crate::{CanId, Frame, Span, Tick, Transmit};
 
 /// Settings of a valid TPDO, from the objects 1800h.. and 1A00h.. .
 #[derive(Clone, Copy, Debug)]
@@ -45,11 +45,11 @@ impl Settings {
     };
 
     /// The end of the inhibit time after a transmission. The types 254 and 255 have an inhibit time (CiA 301, 7.5.2.35).
-    fn inhibit_end(&self, sent: Instant) -> Instant {
+    fn inhibit_end(&self, sent: Tick) -> Tick {
         match sent {
-            Instant::NEVER => Instant(0),
-            _ if self.transmission.is_event_driven() => sent.plus(Duration::from_inhibit(self.inhibit)),
-            _ => Instant(0),
+            Tick::NEVER => Tick(0),
+            _ if self.transmission.is_event_driven() => sent.plus(Span::from_inhibit(self.inhibit)),
+            _ => Tick(0),
         }
     }
 
@@ -75,11 +75,11 @@ pub struct Tpdo {
     /// The data that was sent last; for type 252, the data sampled with the last SYNC.
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
-    event_due: Instant,
+    event_due: Tick,
     /// The last transmission since the last reset, or `NEVER`. No reconfiguration shortens the inhibit time.
-    sent: Instant,
+    sent: Tick,
     /// The end of the inhibit time; earlier, a transmission waits.
-    inhibited_until: Instant,
+    inhibited_until: Tick,
     /// When to ask the application for events. Used only for a TPDO that sends events.
     events: Events,
 }
@@ -111,11 +111,18 @@ impl Tpdo {
             syncs: 0,
             is_counting: false,
             data: None,
-            event_due: Instant::NEVER,
-            sent: Instant::NEVER,
-            inhibited_until: Instant(0),
+            event_due: Tick::NEVER,
+            sent: Tick::NEVER,
+            inhibited_until: Tick(0),
             events: Events::NONE,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.event_due.shift(by);
+        self.sent.shift(by);
+        self.inhibited_until.shift(by);
     }
 
     /// Takes new settings and discards the state of the old ones.
@@ -128,6 +135,11 @@ impl Tpdo {
     /// The settings of a valid TPDO.
     pub(crate) fn settings(&self) -> Option<&Settings> {
         self.is_valid.then_some(&self.settings)
+    }
+
+    /// The CAN-ID of a valid TPDO that answers remote frames.
+    pub(crate) fn requested(&self) -> Option<CanId> {
+        self.settings().filter(|settings| settings.answers_remote).map(|settings| settings.id)
     }
 
     /// Whether a transmission waits.
@@ -179,27 +191,27 @@ impl Tpdo {
     }
 
     /// When to ask the application again.
-    pub(crate) fn event_due(&self) -> Instant {
+    pub(crate) fn event_due(&self) -> Tick {
         let is_asked = self.events.may_wait
             && self.settings.transmission.is_event_driven()
             && (self.settings.event == 0 || self.events.is_open);
-        if is_asked { self.inhibited_until } else { Instant::NEVER }
+        if is_asked { self.inhibited_until } else { Tick::NEVER }
     }
 
     /// Discards a waiting transmission and the event timer, on leaving Operational. The inhibit time continues.
     pub(crate) fn stop(&mut self) {
         (self.pending, self.syncs, self.is_counting, self.data) = (false, 0, false, None);
-        (self.event_due, self.inhibited_until) = (Instant::NEVER, self.settings.inhibit_end(self.sent));
+        (self.event_due, self.inhibited_until) = (Tick::NEVER, self.settings.inhibit_end(self.sent));
         self.events = Events::NONE;
     }
 
     /// At a reset: the inhibit time does not outlast the next `stop`.
     pub(crate) fn forget_sent(&mut self) {
-        self.sent = Instant::NEVER;
+        self.sent = Tick::NEVER;
     }
 
     /// When the next transmission or the event timer is due.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         if self.pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
     }
 
@@ -246,9 +258,6 @@ impl Tpdo {
     #[inline(never)]
     pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let settings = &self.settings;
-        if !settings.answers_remote {
-            return;
-        }
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // In a full queue the sample is dropped: the client repeats its request.
@@ -294,7 +303,7 @@ impl Tpdo {
     pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
         let elapsed = context.now >= self.event_due;
         let sends_events = self.events_of().is_some();
-        if elapsed || sends_events && self.event_due == Instant::NEVER {
+        if elapsed || sends_events && self.event_due == Tick::NEVER {
             self.event_due = self.event_due.following(self.settings.event, context.now);
         }
         if !sends_events {
@@ -327,11 +336,11 @@ impl Tpdo {
 
     /// A TPDO of type 254 or 255 has been sent, or has to wait.
     #[inline(never)]
-    fn restart_timers(&mut self, now: Instant) {
+    fn restart_timers(&mut self, now: Tick) {
         if !self.pending && self.settings.inhibit != 0 {
             self.inhibited_until = self.settings.inhibit_end(self.sent);
         }
-        if self.event_due == Instant::NEVER {
+        if self.event_due == Tick::NEVER {
             self.event_due = self.event_due.following(self.settings.event, now);
         }
     }

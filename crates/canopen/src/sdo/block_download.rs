@@ -2,7 +2,7 @@
 
 use super::objects::{BUFFER, Sink};
 use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects};
-use crate::Instant;
+use crate::Tick;
 
 /// A block download under way.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +26,10 @@ pub(super) struct Receiver {
 impl Receiver {
     pub(super) fn new(sink: Sink, check_crc: bool) -> Receiver {
         Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None }
+    }
+
+    pub(super) fn sink(&self) -> &Sink {
+        &self.sink
     }
 
     /// Whether the next frame is a segment and not a request.
@@ -96,7 +100,7 @@ impl Receiver {
         end: BlockEnd,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
-        now: Instant,
+        now: Tick,
     ) -> Result<(), Abort> {
         if let Some(last) = &self.last {
             let data = last.get(..7 - usize::from(end.unused.min(7))).unwrap_or(last);

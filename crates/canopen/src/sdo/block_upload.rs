@@ -34,6 +34,10 @@ impl Sender {
         Sender { source, block_size, phase: Phase::Ready, acknowledged: 0, sequence: 0, crc: 0, checked: 0 }
     }
 
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
     /// Whether segments of the block remain to be sent.
     pub(super) fn is_sending(&self) -> bool {
         self.phase == Phase::Sending
@@ -55,12 +59,15 @@ impl Sender {
     }
 
     /// Sends segments of the block as long as `send` accepts them.
-    pub(super) fn send(
+    pub(super) fn send<O: Objects>(
         &mut self,
-        buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut O,
         mut send: impl FnMut([u8; 8]) -> bool,
     ) -> Result<(), Abort> {
+        if O::PARTS && self.source.is_in_parts() {
+            return self.send_parts(buffer, objects, send);
+        }
         let content = self.source.content(buffer, objects)?;
         let mut rest = content.get(self.offset(self.sequence)..).unwrap_or(&[]);
         while self.is_sending() {
@@ -77,6 +84,34 @@ impl Sender {
             rest = after;
         }
         self.check(content);
+        Ok(())
+    }
+
+    /// As [`send`](Sender::send), for an upload in parts.
+    fn send_parts(
+        &mut self,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+        mut send: impl FnMut([u8; 8]) -> bool,
+    ) -> Result<(), Abort> {
+        while self.is_sending() {
+            let offset = self.offset(self.sequence);
+            let data = self.source.piece(offset, buffer, objects)?;
+            let last = offset + usize::from(data.len()) >= self.source.len();
+            let sequence = BlockSize::new(self.sequence + 1).ok_or(Abort::Sequence)?;
+            if !send(BlockSegment { last, sequence, data: data.padded() }.encode()) {
+                break;
+            }
+            self.sequence = sequence.get();
+            if last || sequence == self.block_size {
+                self.phase = Phase::Waiting;
+            }
+            // A segment that is sent again does not count again.
+            if offset == self.checked {
+                self.crc = crc::extend(self.crc, data.as_slice());
+                self.checked += usize::from(data.len());
+            }
+        }
         Ok(())
     }
 

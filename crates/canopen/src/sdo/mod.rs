@@ -8,6 +8,7 @@ mod block;
 mod block_download;
 mod block_upload;
 mod bytes;
+mod channel;
 pub(crate) mod crc;
 mod objects;
 mod request;
@@ -18,11 +19,12 @@ mod server;
 pub use abort::Abort;
 pub use block::{BlockEnd, BlockSegment, BlockSize};
 pub use bytes::Bytes;
+pub use channel::Channel;
 pub use objects::Part;
 pub(crate) use objects::{BUFFER, Objects, Writable};
 pub use request::{Initiate, Request};
 pub use response::Response;
-pub(crate) use server::Server;
+use server::Server;
 
 /// The object of a transfer: index and sub-index, bytes 1 to 3 of the frames that initiate a transfer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,6 +49,9 @@ impl Multiplexer {
     }
 }
 
+/// The bit of the command byte that alternates from segment to segment.
+const TOGGLE: u8 = 0x10;
+
 /// One segment of a segmented transfer, the same in both directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
@@ -62,7 +67,7 @@ impl Segment {
     fn parse(frame: &[u8; 8]) -> Segment {
         let [command, data @ ..] = frame;
         let unused = command >> 1 & 7;
-        Segment { toggle: command & 0x10 != 0, last: command & 1 != 0, data: Bytes::new(*data, 7 - unused) }
+        Segment { toggle: command & TOGGLE != 0, last: command & 1 != 0, data: Bytes::new(*data, 7 - unused) }
     }
 
     fn encode(self, command: u8) -> [u8; 8] {

@@ -2,7 +2,7 @@
 //! a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
-use crate::Instant;
+use crate::Tick;
 use crate::copy::copy;
 
 /// Size of the buffer in bytes: the longest value, and the longest part of a stream. A multiple of a segment (7), and
@@ -22,7 +22,7 @@ pub enum Part<'a> {
 
 /// How an entry accepts a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Writable {
+pub enum Writable {
     /// The entry takes one value of at most this many bytes.
     Value(usize),
     /// The entry is a domain and takes its content in parts.
@@ -30,23 +30,35 @@ pub(crate) enum Writable {
 }
 
 /// The dictionary with its values and rules, as the server uses it.
-pub(crate) trait Objects {
+pub trait Objects {
     /// Whether block uploads are supported.
     const BLOCK_UPLOAD: bool;
     /// Whether block downloads are supported.
     const BLOCK_DOWNLOAD: bool;
+    /// Whether domains can be uploaded in parts, and the end of an incomplete transfer is reported.
+    const PARTS: bool;
+    /// Free places in the transmit queue that a block upload leaves.
+    const RESERVED_ROOM: usize;
 
     /// The value of an entry. The application may set it before.
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry accepts a download, or why it does not.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and applies its effect.
-    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
+    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Tick) -> Result<(), Abort>;
     /// Whether the response to the latest write has to wait for [`Server::release`](super::Server::release). Returns
     /// `true` once.
     fn take_deferred(&mut self) -> bool;
     /// Hands over a part of a domain.
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
+    /// A download of a domain has ended before it was complete.
+    fn abandon(&mut self, at: Multiplexer);
+    /// Begins an upload in parts. Returns the length; `None` for an entry that [`read`](Objects::read) gives as a whole.
+    fn open(&mut self, at: Multiplexer) -> Result<Option<usize>, Abort>;
+    /// Fills `part` with the content from `offset` on.
+    fn part(&mut self, at: Multiplexer, offset: usize, part: &mut [u8]) -> Result<(), Abort>;
+    /// An upload in parts has ended.
+    fn close(&mut self, at: Multiplexer, is_complete: bool);
 }
 
 /// The data of an upload. A value that fits the buffer is copied there, so that it cannot change during the transfer. A
@@ -55,7 +67,12 @@ pub(crate) trait Objects {
 pub(super) struct Source {
     at: Multiplexer,
     len: usize,
+    /// For an upload in parts, the offset of the part in the buffer; [`NO_PART`] before the first one.
+    part: Option<usize>,
 }
+
+/// An offset beyond every domain: the buffer has no part of it.
+const NO_PART: usize = usize::MAX;
 
 impl Source {
     pub(super) fn new(at: Multiplexer, value: &[u8], buffer: &mut [u8; BUFFER]) -> Source {
@@ -63,7 +80,23 @@ impl Source {
         if let Some(place) = buffer.get_mut(..len) {
             copy(place, value);
         }
-        Source { at, len }
+        Source { at, len, part: None }
+    }
+
+    /// An upload in parts.
+    pub(super) fn in_parts(at: Multiplexer, len: usize) -> Source {
+        Source { at, len, part: Some(NO_PART) }
+    }
+
+    pub(super) fn is_in_parts(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// The upload has ended.
+    pub(super) fn close(&self, is_complete: bool, objects: &mut impl Objects) {
+        if self.is_in_parts() {
+            objects.close(self.at, is_complete);
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -85,15 +118,23 @@ impl Source {
         content.get(..self.len).ok_or(Abort::General)
     }
 
-    /// The next bytes from `offset` on, at most seven.
+    /// The next bytes of an upload in parts. The buffer holds 16 segments, so no segment is in two parts.
+    #[inline(never)]
     pub(super) fn piece(
-        &self,
+        &mut self,
         offset: usize,
-        buffer: &[u8; BUFFER],
+        buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<Bytes<7>, Abort> {
-        let content = self.content(buffer, objects)?;
-        Ok(Bytes::from_slice(content.get(offset..).unwrap_or(&[])))
+        let len = |start: usize| self.len.saturating_sub(start).min(BUFFER);
+        let held = self.part.filter(|start| *start <= offset && offset - *start < BUFFER);
+        let start = held.unwrap_or(offset);
+        if held.is_none() {
+            self.part = Some(NO_PART);
+            objects.part(self.at, start, buffer.get_mut(..len(start)).unwrap_or_default())?;
+            self.part = Some(start);
+        }
+        Ok(Bytes::from_slice(buffer.get(offset - start..len(start)).unwrap_or_default()))
     }
 }
 
@@ -224,11 +265,18 @@ impl Sink {
         crc::extend(self.crc, self.held(buffer))
     }
 
+    /// The download has ended before it was complete.
+    pub(super) fn abandon(&self, objects: &mut impl Objects) {
+        if self.kind == Writable::Stream {
+            objects.abandon(self.at);
+        }
+    }
+
     pub(super) fn complete(
         &mut self,
         buffer: &[u8; BUFFER],
         objects: &mut impl Objects,
-        now: Instant,
+        now: Tick,
     ) -> Result<(), Abort> {
         if self.announced.is_some_and(|size| size != self.len()) {
             return Err(Abort::TooShort);

@@ -7,14 +7,14 @@ use super::block_upload::Sender;
 use super::objects::BUFFER;
 use super::segmented::{Download, Upload};
 use super::{Abort, BlockSegment, BlockSize, Multiplexer, Objects, Response};
-use crate::{Duration, Instant};
+use crate::{Span, Tick};
 use core::marker::PhantomData;
 
 /// How long a client may be silent during a transfer. CiA 301 leaves the time to the device.
-const TIME_OUT: Duration = Duration::from_millis(1000);
+const TIME_OUT: Span = Span::from_millis(1000);
 /// How long a client may be silent within a block. Then the last segment was lost, and the server acknowledges the
 /// segments that have arrived.
-const BLOCK_PAUSE: Duration = Duration::from_millis(300);
+const BLOCK_PAUSE: Span = Span::from_millis(300);
 
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct Server<O> {
     /// For an upload, a copy of the value; for a download, the data received so far.
     buffer: [u8; BUFFER],
     /// The time of the last progress.
-    active: Instant,
+    active: Tick,
     /// The last request that can be part of a series, and whether `reply` answers this request.
     previous: [u8; 8],
     is_answered: bool,
@@ -53,12 +53,17 @@ impl<O: Objects> Server<O> {
             transfer: Transfer::Idle,
             multiplexer: Multiplexer { index: 0, sub: 0 },
             buffer: [0; BUFFER],
-            active: Instant(0),
+            active: Tick(0),
             previous: [0; 8],
             is_answered: false,
             reply: [0; 8],
             objects: PhantomData,
         }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.active.shift(by);
     }
 
     /// The last response as a frame.
@@ -90,17 +95,17 @@ impl<O: Objects> Server<O> {
     /// The next deadline of [`expire`](Server::expire).
     // Not inlined: three callers.
     #[inline(never)]
-    pub(crate) fn deadline(&self) -> Instant {
+    pub(crate) fn deadline(&self) -> Tick {
         match &self.transfer {
-            Transfer::Idle => Instant::NEVER,
+            Transfer::Idle => Tick::NEVER,
             _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
             _ => self.active.plus(TIME_OUT),
         }
     }
 
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
-    pub(crate) fn reset(&mut self) {
-        self.transfer = Transfer::Idle;
+    pub(crate) fn reset(&mut self, objects: &mut O) {
+        self.abandon(objects);
         self.multiplexer = Multiplexer { index: 0, sub: 0 };
         (self.previous, self.is_answered) = ([0; 8], false);
     }
@@ -108,7 +113,7 @@ impl<O: Objects> Server<O> {
     /// Takes a frame that is a segment within a block and only has to be copied to the buffer. Returns whether the
     /// frame was taken; if not, [`answer`](Server::answer) takes it. The deadline does not become earlier.
     #[inline]
-    pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Instant) -> bool {
+    pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Tick) -> bool {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return false };
         let is_taken = receiver.take_next(frame, &mut self.buffer);
         if is_taken {
@@ -121,7 +126,7 @@ impl<O: Objects> Server<O> {
     // Requests that begin a download or an upload are the most frequent ones. They are not part of a series, so they
     // are neither compared with the request before nor remembered.
     #[inline]
-    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let command = frame[0] >> 5;
         if !matches!(command, 1 | 2) || self.expects_block_segments() {
             self.answer_in_series(frame, objects, now)
@@ -134,7 +139,7 @@ impl<O: Objects> Server<O> {
 
     /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
-    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
         let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
@@ -182,27 +187,41 @@ impl<O: Objects> Server<O> {
     }
 
     /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
-    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Instant) -> bool {
+    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
         if answer == Ok(true) && objects.take_deferred() {
             self.transfer = Transfer::Deferred;
-            return self.settle(Ok(false), now);
+            return self.settle(Ok(false), objects, now);
         }
-        self.settle(answer, now)
+        self.settle(answer, objects, now)
+    }
+
+    /// Ends the transfer. The application learns of a domain whose transfer is not complete.
+    fn abandon(&mut self, objects: &mut O) {
+        if O::PARTS {
+            match &self.transfer {
+                Transfer::Upload(upload) => upload.source().close(false, objects),
+                Transfer::BlockUpload(sender) => sender.source().close(false, objects),
+                Transfer::Download(download) => download.sink().abandon(objects),
+                Transfer::BlockDownload(receiver) => receiver.sink().abandon(objects),
+                Transfer::Idle | Transfer::Deferred => (),
+            }
+        }
+        self.transfer = Transfer::Idle;
     }
 
     /// Reports the end of a write whose reply was held back. Returns whether there is a reply and its client still
     /// waits.
-    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> bool {
+    pub(crate) fn release(&mut self, result: Result<(), Abort>, objects: &mut O, now: Tick) -> bool {
         if !matches!(self.transfer, Transfer::Deferred) {
             return false;
         }
         self.transfer = Transfer::Idle;
-        self.settle(result.map(|()| true), now)
+        self.settle(result.map(|()| true), objects, now)
     }
 
     /// Handles a time-out: acknowledges a block whose last segment was lost, or aborts the transfer. Returns whether
     /// there is a reply.
-    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+    pub(crate) fn expire(&mut self, objects: &mut O, now: Tick) -> bool {
         if now < self.deadline() {
             return false;
         }
@@ -213,21 +232,21 @@ impl<O: Objects> Server<O> {
                 let sequence = receiver.acknowledge();
                 self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
-            _ => self.settle(Err(Abort::TimeOut), now),
+            _ => self.settle(Err(Abort::TimeOut), objects, now),
         }
     }
 
     /// Converts the answer to whether there is a reply. An error ends the transfer.
     #[inline]
-    fn settle(&mut self, answer: Answer, now: Instant) -> bool {
+    fn settle(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
         self.active = now;
-        answer.unwrap_or_else(|abort| self.give_up(abort))
+        answer.unwrap_or_else(|abort| self.give_up(abort, objects))
     }
 
     /// Ends the transfer and stores the abort message.
     #[inline(never)]
-    fn give_up(&mut self, abort: Abort) -> bool {
-        self.transfer = Transfer::Idle;
+    fn give_up(&mut self, abort: Abort, objects: &mut O) -> bool {
+        self.abandon(objects);
         self.is_answered = false;
         self.set_reply(Response::Abort(self.multiplexer, abort.code()))
     }
@@ -243,11 +262,11 @@ impl<O: Objects> Server<O> {
     pub(crate) fn send_block(
         &mut self,
         objects: &mut O,
-        now: Instant,
+        now: Tick,
         send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {
         let Transfer::BlockUpload(sender) = &mut self.transfer else { return false };
-        let result = sender.send(&self.buffer, objects, send);
-        self.settle(result.map(|()| false), now)
+        let result = sender.send(&mut self.buffer, objects, send);
+        self.settle(result.map(|()| false), objects, now)
     }
 }

@@ -1,7 +1,7 @@
 //! SYNC producer (CiA 301, 7.2.5): sends a SYNC every communication cycle period.
 
 use super::Settings;
-use crate::{CanId, CobId, Duration, Frame, Instant};
+use crate::{CanId, CobId, Frame, Span, Tick};
 
 /// Sends SYNCs while bit 30 of 1005h is set and 1006h is not 0.
 #[derive(Debug)]
@@ -12,12 +12,17 @@ pub(crate) struct Producer {
     /// The highest counter value; 0 for no counter.
     overflow: u8,
     counter: u8,
-    due: Instant,
+    due: Tick,
 }
 
 impl Producer {
     pub(crate) const fn new() -> Producer {
-        Producer { id: CanId::of_service(0x080, 0), period: 0, overflow: 0, counter: 0, due: Instant::NEVER }
+        Producer { id: CanId::of_service(0x080, 0), period: 0, overflow: 0, counter: 0, due: Tick::NEVER }
+    }
+
+    /// The epoch of the clock has moved.
+    pub(crate) fn shift(&mut self, by: Span) {
+        self.due.shift(by);
     }
 
     /// Takes new settings. `restart` or `stop` follows.
@@ -31,16 +36,16 @@ impl Producer {
     /// The next SYNC is due at once, with the counter 1.
     pub(crate) fn restart(&mut self) {
         self.counter = 0;
-        self.due = if self.period == 0 { Instant::NEVER } else { Instant(0) };
+        self.due = if self.period == 0 { Tick::NEVER } else { Tick(0) };
     }
 
     /// No SYNC is produced in this NMT state.
     pub(crate) fn stop(&mut self) {
-        self.due = Instant::NEVER;
+        self.due = Tick::NEVER;
     }
 
     /// When the next SYNC is due.
-    pub(crate) fn due(&self) -> Instant {
+    pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
@@ -57,15 +62,15 @@ impl Producer {
     }
 
     /// The SYNC has been sent. The next one is due a period after this one was, so delays do not add up.
-    pub(crate) fn sent(&mut self, now: Instant) {
+    pub(crate) fn sent(&mut self, now: Tick) {
         self.counter = self.next_counter();
-        let (period, first) = (Duration(self.period.into()), self.due == Instant(0));
-        let next = if first { now } else { self.due }.plus(period);
-        self.due = if next > now { next } else { now.plus(period) };
+        let first = self.due == Tick(0);
+        let next = if first { now } else { self.due }.plus_long(self.period);
+        self.due = if next > now { next } else { now.plus_long(self.period) };
     }
 
     /// The SYNC cannot be sent before this instant.
-    pub(crate) fn wait_until(&mut self, due: Instant) {
+    pub(crate) fn wait_until(&mut self, due: Tick) {
         self.due = due;
     }
 }

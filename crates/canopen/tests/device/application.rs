@@ -127,7 +127,7 @@ impl Application for Numbers {
         let packed: &[u8] = match group {
             Group::Communication => communication,
             Group::Application => application,
-            Group::Calibration => calibration,
+            _ => calibration,
         };
         let soundness = if self.is_damaged { Soundness::Older } else { Soundness::Whole };
         Stored { packed, soundness }

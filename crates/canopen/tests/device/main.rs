@@ -3,9 +3,12 @@
 mod application;
 mod bench;
 mod block;
+mod channels;
 mod dictionary;
+mod domains;
 mod emcy;
 mod emcy_detail;
+mod emergencies;
 mod events;
 #[path = "../exchange/mod.rs"]
 mod exchange;
@@ -16,6 +19,7 @@ mod lss;
 mod mapping;
 mod multiplexed;
 mod nmt;
+mod own_groups;
 mod producers;
 mod requests;
 mod robustness;

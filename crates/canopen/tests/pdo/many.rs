@@ -13,8 +13,15 @@ const TPDO: u16 = 0x181;
 const RPDO: u16 = 0x381;
 const NOW: Instant = Instant(1_000_000);
 
-const ROOM: Sizes =
-    Sizes { image: 65_000, tpdos: 512, rpdos: 512, watches: 127, scanned: 0, services: Services::ALL };
+const ROOM: Sizes = Sizes {
+    image: 65_000,
+    tpdos: 512,
+    rpdos: 512,
+    watches: 127,
+    scanned: 0,
+    servers: 0,
+    services: Services::ALL,
+};
 type Node = canopen::device!(Recorder, room: ROOM);
 
 /// Records the calls of the application.

@@ -1,10 +1,10 @@
 //! Block download (CiA 301, 7.2.4.3.9 to 11): up to 127 segments before the server answers.
 
-use super::link::Link;
+use super::link::{Channel, Link};
 use super::transfer::{self, Progress, Transfer};
 use super::{BlockDownload, Error, Options};
+use crate::Instant;
 use crate::sdo::{BlockEnd, BlockSegment, BlockSize, Bytes, Multiplexer, Request, Response, crc};
-use crate::{Instant, NodeId};
 
 /// The transfer fails after this many blocks in a row without a segment that the server acknowledged.
 const MAX_EMPTY_BLOCKS: u8 = 3;
@@ -34,10 +34,20 @@ enum Phase {
 }
 
 impl<'a> BlockDownload<'a> {
-    /// Writes an object of a node. Empty data is sent as one segment without bytes.
+    /// Writes an object of a server. Empty data is sent as one segment without bytes.
     #[must_use]
-    pub fn new(node: NodeId, at: Multiplexer, data: &'a [u8], options: Options) -> BlockDownload<'a> {
-        Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, empty_blocks: 0 }, node, at, options)
+    pub fn new(
+        channel: impl Into<Channel>,
+        at: Multiplexer,
+        data: &'a [u8],
+        options: Options,
+    ) -> BlockDownload<'a> {
+        Transfer::with(
+            Protocol { data, done: 0, phase: Phase::Begin, empty_blocks: 0 },
+            channel.into(),
+            at,
+            options,
+        )
     }
 }
 

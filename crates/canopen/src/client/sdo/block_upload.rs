@@ -1,11 +1,11 @@
 //! Block upload (CiA 301, 7.2.4.3.13 to 15): up to 127 segments before the client answers.
 
-use super::link::Link;
+use super::link::{Channel, Link};
 use super::sink::Sink;
 use super::transfer::{self, Progress, Transfer};
 use super::{BlockUpload, Error, Options, upload};
 use crate::sdo::{BlockEnd, BlockSegment, Multiplexer, Request, Response, crc};
-use crate::{Duration, Instant, NodeId};
+use crate::{Duration, Instant};
 
 /// A pause of this length within a block means that its last segment was lost. The time-out of servers is longer.
 const PAUSE: Duration = Duration::from_millis(250);
@@ -45,9 +45,9 @@ enum Phase {
 }
 
 impl<S: Sink> BlockUpload<S> {
-    /// Reads an object of a node into a sink.
+    /// Reads an object of a server into a sink.
     #[must_use]
-    pub fn new(node: NodeId, at: Multiplexer, sink: S, options: Options) -> BlockUpload<S> {
+    pub fn new(channel: impl Into<Channel>, at: Multiplexer, sink: S, options: Options) -> BlockUpload<S> {
         let protocol = Protocol {
             simple: upload::Protocol::new(sink),
             phase: Phase::Begin,
@@ -58,7 +58,7 @@ impl<S: Sink> BlockUpload<S> {
             crc: 0,
             empty_blocks: 0,
         };
-        Transfer::with(protocol, node, at, options)
+        Transfer::with(protocol, channel.into(), at, options)
     }
 
     /// The sink with the received bytes.

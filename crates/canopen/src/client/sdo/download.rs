@@ -1,10 +1,10 @@
 //! Expedited and segmented download (CiA 301, 7.2.4.3.3 and 7.2.4.3.4).
 
-use super::link::Link;
+use super::link::{Channel, Link};
 use super::transfer::{self, Progress, Transfer};
 use super::{Download, Error, Options};
+use crate::Instant;
 use crate::sdo::{Bytes, Initiate, Multiplexer, Request, Response, Segment};
-use crate::{Instant, NodeId};
 
 /// A download under way.
 #[derive(Debug)]
@@ -24,10 +24,15 @@ struct Sent {
 }
 
 impl<'a> Download<'a> {
-    /// Writes an object of a node.
+    /// Writes an object of a server.
     #[must_use]
-    pub fn new(node: NodeId, at: Multiplexer, data: &'a [u8], options: Options) -> Download<'a> {
-        Transfer::with(Protocol { data, done: 0, segment: None }, node, at, options)
+    pub fn new(
+        channel: impl Into<Channel>,
+        at: Multiplexer,
+        data: &'a [u8],
+        options: Options,
+    ) -> Download<'a> {
+        Transfer::with(Protocol { data, done: 0, segment: None }, channel.into(), at, options)
     }
 }
 

@@ -3,16 +3,33 @@
 use super::{AbortCode, Error, Options};
 use crate::client::service::later;
 use crate::sdo::{Abort, Multiplexer, Request, Response};
-use crate::{Duration, Frame, Instant, NodeId};
+use crate::{CanId, Duration, Frame, Instant, NodeId};
 
 /// CAN-IDs of the default SDO channel without the node-ID (CiA 301, 7.3.5).
 const TO_SERVER: u16 = 0x600;
 const FROM_SERVER: u16 = 0x580;
 
-/// The connection to the server of one node.
+/// The two CAN-IDs between a client and a server: the default ones of a node, or those of an SDO client object (1280h
+/// and up, [`Device::sdo_client`](crate::Device::sdo_client)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The CAN-ID of the requests.
+    pub to_server: CanId,
+    /// The CAN-ID of the responses.
+    pub from_server: CanId,
+}
+
+impl From<NodeId> for Channel {
+    /// The default channel of a node.
+    fn from(node: NodeId) -> Channel {
+        Channel { to_server: node.service(TO_SERVER), from_server: node.service(FROM_SERVER) }
+    }
+}
+
+/// The connection to one server.
 #[derive(Debug)]
 pub struct Link {
-    node: NodeId,
+    channel: Channel,
     /// The object of the transfer.
     pub(super) at: Multiplexer,
     pub(super) options: Options,
@@ -30,9 +47,9 @@ pub struct Link {
 }
 
 impl Link {
-    pub(super) fn new(node: NodeId, at: Multiplexer, options: Options) -> Link {
+    pub(super) fn new(channel: Channel, at: Multiplexer, options: Options) -> Link {
         Link {
-            node,
+            channel,
             at,
             options,
             outgoing: None,
@@ -79,7 +96,7 @@ impl Link {
     }
 
     fn frame(&self, data: [u8; 8]) -> Frame {
-        Frame::data_frame(self.node.service(TO_SERVER), 8, data)
+        Frame::data_frame(self.channel.to_server, 8, data)
     }
 
     /// Sets the longest time until the next frame of the server.
@@ -94,7 +111,7 @@ impl Link {
 
     /// The data of a frame from the server. A frame cannot be an answer while a request still waits to be sent.
     pub(super) fn response(&self, frame: &Frame) -> Option<[u8; 8]> {
-        frame.full(self.node.service(FROM_SERVER)).copied().filter(|_| self.outgoing.is_none())
+        frame.full(self.channel.from_server).copied().filter(|_| self.outgoing.is_none())
     }
 
     /// Whether a frame repeats the newest frame.

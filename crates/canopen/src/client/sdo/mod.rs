@@ -21,6 +21,7 @@ mod upload;
 
 pub use abort_code::AbortCode;
 pub use error::Error;
+pub use link::Channel;
 pub use options::Options;
 pub use sink::{Buffer, Sink};
 pub use transfer::Transfer;

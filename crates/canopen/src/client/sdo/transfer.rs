@@ -1,11 +1,11 @@
 //! The part that all kinds of transfer have in common: order of the steps, time-outs, retries, end.
 
-use super::link::Link;
+use super::link::{Channel, Link};
 use super::{Error, Options};
 use crate::client::service::later;
 use crate::client::{Service, Step, Taken};
 use crate::sdo::Multiplexer;
-use crate::{Frame, Instant, NodeId};
+use crate::{Frame, Instant};
 
 /// One kind of transfer: its requests, and its reaction to the answers.
 pub trait Protocol {
@@ -72,9 +72,9 @@ pub struct Transfer<P> {
 }
 
 impl<P: Protocol> Transfer<P> {
-    pub(super) fn with(protocol: P, node: NodeId, at: Multiplexer, options: Options) -> Transfer<P> {
+    pub(super) fn with(protocol: P, channel: Channel, at: Multiplexer, options: Options) -> Transfer<P> {
         let retries = options.retries;
-        let link = Link::new(node, at, options);
+        let link = Link::new(channel, at, options);
         Transfer { protocol, link, phase: Phase::New, end: Instant::NEVER, retries }
     }
 

@@ -1,11 +1,11 @@
 //! Expedited and segmented upload (CiA 301, 7.2.4.3.5 and 7.2.4.3.6).
 
-use super::link::Link;
+use super::link::{Channel, Link};
 use super::sink::Sink;
 use super::transfer::{self, Progress, Transfer};
 use super::{Error, Options, Upload};
+use crate::Instant;
 use crate::sdo::{Multiplexer, Request, Response, Segment};
-use crate::{Instant, NodeId};
 
 /// An upload under way.
 #[derive(Debug)]
@@ -24,10 +24,10 @@ struct Segments {
 }
 
 impl<S: Sink> Upload<S> {
-    /// Reads an object of a node into a sink.
+    /// Reads an object of a server into a sink.
     #[must_use]
-    pub fn new(node: NodeId, at: Multiplexer, sink: S, options: Options) -> Upload<S> {
-        Transfer::with(Protocol::new(sink), node, at, options)
+    pub fn new(channel: impl Into<Channel>, at: Multiplexer, sink: S, options: Options) -> Upload<S> {
+        Transfer::with(Protocol::new(sink), channel.into(), at, options)
     }
 
     /// The sink with the received bytes.

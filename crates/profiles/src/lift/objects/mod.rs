@@ -141,6 +141,11 @@ impl Profile for Objects {
         }
     }
 
+    /// The virtual devices and their sensors decide which TPDOs exist, and what is broadcast.
+    fn switches_pdos(&self, index: u16) -> bool {
+        matches!(index, 0x2301 | 0x2305)
+    }
+
     fn sends_events(&self, tpdo: u16) -> bool {
         tpdo == INPUTS
     }

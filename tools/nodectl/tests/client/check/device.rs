@@ -183,7 +183,7 @@ impl Application for App {
 const SIZE: usize = 2048;
 /// Sizes that suffice for every dictionary.
 const ROOM: Sizes =
-    Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned: 48, services: Services::ALL };
+    Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned: 48, servers: 0, services: Services::ALL };
 
 /// The library's device with the additions.
 pub(super) struct Whole {
