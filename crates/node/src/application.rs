@@ -124,8 +124,11 @@ impl Application for NodeApplication {
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
         show(0x1F57, 1, &status.to_le_bytes());
         self.adopt_older_choice(image);
-        let is_stored = !self.stored.get(Group::Communication).packed.is_empty();
-        self.profile.initialise(image, is_stored);
+        let mut stored = Groups::NONE;
+        for group in Group::ALL {
+            stored.set(group, !self.stored.get(group).packed.is_empty());
+        }
+        self.profile.initialise(image, stored);
         self.show_personality(image);
         self.show_flags(image);
         self.show_lost_events(image);

@@ -299,10 +299,10 @@ macro_rules! personalities {
             }
 
             /// As [`Profile::initialise`]($crate::profile::Profile::initialise).
-            pub fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
+            pub fn initialise(&mut self, image: &mut [u8], stored: canopen::dictionary::Groups) {
                 use $crate::profile::Profile;
                 match self {
-                    $(AnyProfile::$Name(own) => own.initialise(image, is_stored),)+
+                    $(AnyProfile::$Name(own) => own.initialise(image, stored),)+
                 }
             }
 

@@ -104,6 +104,51 @@ fn autozero_moves_the_offset_until_the_value_is_zero() {
     assert!(real(&mut bench, 0x6130, 2) > 20.0);
 }
 
+/// The former offset leaves no rest, however large the value is.
+#[test]
+fn autozero_gives_exactly_zero_after_an_old_offset() {
+    let mut bench = Bench::booted();
+    for offset in [123.0_f32, -0.1, 1e-3] {
+        bench.write(0x6124, 1, &offset.to_le_bytes()).unwrap();
+        bench.sample(&raw(876_543.0, 298.15));
+        bench.write(0x6125, 1, b"zero").unwrap();
+        bench.sample(&raw(876_543.0, 298.15));
+        assert_eq!(real(&mut bench, 0x6130, 1), 0.0, "{offset}");
+    }
+}
+
+fn span(bench: &mut Bench) -> (f32, f32) {
+    (real(bench, 0x6148, 1), real(bench, 0x6149, 1))
+}
+
+/// CMP 8271 gives $PRESSURE MIN and $PRESSURE MAX as the defaults of 6148h and 6149h.
+#[test]
+fn the_default_span_is_the_range_of_the_transducer() {
+    let mut bench = Bench::booted();
+    assert_eq!(span(&mut bench), (0.0, 10.0));
+    bench.write(0x2203, 0, b"cali").unwrap();
+    bench.write(0x2200, 2, &40e6_f32.to_le_bytes()).unwrap();
+    bench.write(0x2200, 1, &(-1e5_f32).to_le_bytes()).unwrap();
+    assert_eq!(span(&mut bench), (-1.0, 400.0));
+    bench.write(0x2204, 0, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(span(&mut bench), (-1.0, 400.0));
+    bench.sample(&raw(250_000.0, 298.15));
+    assert_eq!(bench.read(0x6150, 1).unwrap()[0], 0);
+
+    // A span that a client has chosen stays.
+    bench.write(0x6149, 1, &10_f32.to_le_bytes()).unwrap();
+    bench.write(0x1010, 3, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(span(&mut bench), (-1.0, 10.0));
+    bench.write(0x2203, 0, b"cali").unwrap();
+    bench.write(0x2200, 2, &2e6_f32.to_le_bytes()).unwrap();
+    assert_eq!(span(&mut bench), (-1.0, 10.0));
+    bench.write(0x1011, 3, b"load").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(span(&mut bench), (-1.0, 400.0), "2 MPa was not saved");
+}
+
 /// An absolute pressure in Pa does not fit INTEGER16, but the sensor is well.
 #[test]
 fn autozero_is_possible_though_an_integer_is_clipped() {

@@ -4,7 +4,7 @@ use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::board::PositionInputs;
 
-use super::{Area, Cams, Format, Limits, Module, Native, Scale, Sensor, SensorType, Settings};
+use super::{Area, Cams, Format, Limits, Module, Scale, Sensor, SensorType, Settings};
 
 /// Operating parameter (6000h): the position falls when the shaft turns clockwise. Rotary encoders only.
 pub const CODE_SEQUENCE: u16 = 1 << 0;
@@ -159,12 +159,6 @@ impl Parameters {
         PositionInputs { are_used: true, ssi_bits: is_absolute.then(|| self.format.length()) }
     }
 
-    /// Whether every sensor can give this measuring step (6005h:1).
-    #[must_use]
-    pub fn allow_step(&self, nanometres: u32) -> bool {
-        self.natives().all(|native| native.gives_step(nanometres))
-    }
-
     /// Whether every sensor can give the scaling that the parameters ask for.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
@@ -211,10 +205,6 @@ impl Parameters {
     #[must_use]
     pub fn directions(&self) -> u16 {
         self.sensors().fold(0, |bits, sensor| bits | direction_bit(&sensor))
-    }
-
-    fn natives(&self) -> impl Iterator<Item = Native> {
-        self.sensors().map(|sensor| sensor.native())
     }
 
     fn asked_scale(&self, sensor: &Sensor) -> Option<Scale> {

@@ -18,7 +18,7 @@ pub(crate) use sensors::Sensors;
 pub use values::Fields;
 pub(crate) use values::device_type;
 
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Entry, Group, Groups, Object};
 use canopen::sdo::Abort;
 
 use super::{Encoder, Parameters, Snapshot};
@@ -71,8 +71,8 @@ impl Profile for Objects {
         Objects { fields }
     }
 
-    fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
-        self.fields.initialise(image, is_stored);
+    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
+        self.fields.initialise(image, stored.contains(Group::Communication));
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {

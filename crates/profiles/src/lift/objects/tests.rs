@@ -505,7 +505,7 @@ fn a_reset_silences_what_is_not_chosen() {
     let mut node = Node::new();
     node.write(0x2305, 0, 3).unwrap();
     DICTIONARY.field(0x2305, 0).set(&mut node.image, &[2]);
-    node.objects.initialise(&mut node.image, false);
+    node.objects.initialise(&mut node.image, canopen::dictionary::Groups::NONE);
     assert_eq!([0x1901, 0x1906].map(|index| node.read(index, 1) >> 31), [0, 1]);
     assert_eq!((node.read(0x1000, 0), node.read(0x6000, 1)), (0x0A00_01A1, 0x0A00));
 }

@@ -15,7 +15,7 @@ pub(crate) use faults::SENSOR_BREAK;
 pub(crate) use manufacturer::{STATUS_AND_USER, STATUS_REGISTER};
 pub use values::Fields;
 
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Entry, Group, Groups, Object};
 use canopen::sdo::Abort;
 
 use super::{Parameters, Snapshot, Transmitter};
@@ -62,8 +62,8 @@ pub(crate) const fn handles_shifted(index: u16, sub: u8, shift: u16) -> bool {
 #[derive(Debug)]
 pub struct Objects {
     fields: &'static Fields,
-    /// Whether each channel shows the value of an intact sensor.
-    is_measured: [bool; 2],
+    /// The process value of each channel without its offset, from an intact sensor.
+    measured: [Option<f32>; 2],
 }
 
 impl Profile for Objects {
@@ -74,7 +74,13 @@ impl Profile for Objects {
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, is_measured: [false; 2] }
+        Objects { fields, measured: [None; 2] }
+    }
+
+    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
+        if !stored.contains(Group::Application) {
+            self.fields.default_spans(image);
+        }
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {
@@ -82,7 +88,7 @@ impl Profile for Objects {
     }
 
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
-        self.is_measured = [snapshot.pressure.is_measured, snapshot.temperature.is_measured];
+        self.measured = [snapshot.pressure.measured, snapshot.temperature.measured];
         self.fields.publish(snapshot, image);
     }
 
@@ -91,7 +97,7 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        self.fields.write(entry, bytes, self.is_measured, image)
+        self.fields.write(entry, bytes, self.measured, image)
     }
 
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {

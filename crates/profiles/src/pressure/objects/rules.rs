@@ -44,20 +44,25 @@ const ZERO_SIGNATURE: [u8; 4] = *b"zero";
 
 impl Fields {
     /// Checks a write to an object that has one of the rules above.
-    /// `is_measured`: whether each channel shows the value of an intact sensor.
+    /// `measured`: the process value of each channel without its offset, from an intact sensor.
     pub(super) fn write(
         &self,
         entry: &Entry,
         bytes: &[u8],
-        is_measured: [bool; 2],
+        measured: [Option<f32>; 2],
         image: &mut [u8],
     ) -> Result<(), Abort> {
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let is_known = match Rule::shifted(entry.index(), entry.sub(), self.shift) {
-            Some(Rule::Autozero) => {
-                return self.autozero(entry.sub(), bytes, is_measured, image);
+            Some(Rule::Autozero) => return self.autozero(entry.sub(), bytes, measured, image),
+            Some(Rule::Calibration(rule)) => {
+                self.calibration.write(rule, entry, bytes, image)?;
+                if (entry.index(), entry.sub()) == (0x2200, 1) || (entry.index(), entry.sub()) == (0x2200, 2)
+                {
+                    self.follow_range(entry, f32::from_bits(code), image);
+                }
+                return Ok(());
             }
-            Some(Rule::Calibration(rule)) => return self.calibration.write(rule, entry, bytes, image),
             Some(Rule::PressureUnit) => Unit::pressure(code).is_some(),
             Some(Rule::TemperatureUnit) => Unit::temperature(code).is_some(),
             None => true,
@@ -71,21 +76,37 @@ impl Fields {
         &self,
         sub: u8,
         bytes: &[u8],
-        [pressure, temperature]: [bool; 2],
+        [pressure, temperature]: [Option<f32>; 2],
         image: &mut [u8],
     ) -> Result<(), Abort> {
         if bytes != ZERO_SIGNATURE {
             return Err(Abort::NotStored);
         }
-        let (channel, is_measured) =
+        let (channel, measured) =
             if sub == 1 { (&self.pressure, pressure) } else { (&self.temperature, temperature) };
-        let value = channel.process_value.f32(image);
-        // The largest value stands for one that no REAL32 can show.
-        if !is_measured || value.abs() >= f32::MAX {
-            return Err(Abort::DeviceState);
-        }
-        let offset = channel.offset.f32(image) - value;
+        let offset = -measured.ok_or(Abort::DeviceState)?;
         channel.offset.store(image, offset.to_le_bytes());
         Ok(())
+    }
+
+    /// The default span of the pressure (6148h, 6149h) is the range of the transducer.
+    #[inline(never)]
+    pub(super) fn default_spans(&self, image: &mut [u8]) {
+        let unit = self.pressure_unit(image);
+        for (span, limit) in
+            [self.pressure.span.start, self.pressure.span.end].iter().zip(self.calibration.range())
+        {
+            span.store(image, unit.of(limit.f32(image)).to_le_bytes());
+        }
+    }
+
+    /// A span that is the range of the transducer follows a write to 2200h:1 or 2200h:2.
+    #[inline(never)]
+    fn follow_range(&self, entry: &Entry, pascal: f32, image: &mut [u8]) {
+        let unit = self.pressure_unit(image);
+        let span = if entry.sub() == 1 { self.pressure.span.start } else { self.pressure.span.end };
+        if span.f32(image).to_bits() == unit.of(entry.field().f32(image)).to_bits() {
+            span.store(image, unit.of(pascal).to_le_bytes());
+        }
     }
 }

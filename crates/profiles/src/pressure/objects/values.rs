@@ -18,7 +18,7 @@ pub(super) struct Channel {
     scaling_offset: Field,
     unit: Field,
     digits: Field,
-    span: Span<Field>,
+    pub(super) span: Span<Field>,
     span16: Span<Field>,
     span32: Span<Field>,
     filter_type: Field,
@@ -103,9 +103,13 @@ impl Fields {
         self.temperature.publish(&snapshot.temperature, image);
     }
 
+    pub(super) fn pressure_unit(&self, image: &[u8]) -> Unit {
+        Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR)
+    }
+
     /// The parameters in the image. An impossible unit acts as the default one.
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
-        let pressure = Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR);
+        let pressure = self.pressure_unit(image);
         let temperature = Unit::temperature(self.temperature.unit.u32(image)).unwrap_or(Unit::CELSIUS);
         Parameters {
             pressure: self.pressure.parameters(pressure, image),
