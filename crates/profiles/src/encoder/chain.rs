@@ -87,10 +87,14 @@ impl Encoder {
                 self.channels.iter_mut().flatten().for_each(Channel::believe);
             }
         }
-        *snapshot = self.fixed;
-        for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
-            if let Some(channel) = channel {
-                *values = channel.sample(raw);
+        let fixed = &self.fixed;
+        snapshot.operating_status = fixed.operating_status;
+        (snapshot.resolution, snapshot.revolutions) = (fixed.resolution, fixed.revolutions);
+        let channels = self.channels.iter_mut().zip(&fixed.channels);
+        for (values, (channel, unused)) in snapshot.channels.iter_mut().zip(channels) {
+            match channel {
+                Some(channel) => channel.sample(raw, values),
+                None => *values = *unused,
             }
         }
         let (channels, limits, time) = (&snapshot.channels, &self.limits, self.retained.operating_time);

@@ -141,7 +141,7 @@ impl Channel {
 
     /// Processes one sample.
     #[inline(never)]
-    pub(super) fn sample(&mut self, raw: &RawEncoder) -> ChannelValues {
+    pub(super) fn sample(&mut self, raw: &RawEncoder, values: &mut ChannelValues) {
         let preset = self.preset.take();
         if preset.is_some() {
             self.input.refer(ALL);
@@ -150,16 +150,16 @@ impl Channel {
         if self.input.has_begun() {
             self.commissioning.observe(self.input.sensor(), &seen);
         }
-        let fixed = ChannelValues {
-            sensor_state: seen.state,
-            commissioning: self.commissioning.progress(),
-            offset: self.position.offset(),
-            presets: self.preset.count,
-            unknown: self.input.unknown(),
-            is_broken: seen.is_broken,
-            ..ChannelValues::default()
+        values.sensor_state = seen.state;
+        values.commissioning = self.commissioning.progress();
+        values.offset = self.position.offset();
+        values.presets = self.preset.count;
+        values.unknown = self.input.unknown();
+        values.is_broken = seen.is_broken;
+        let Some(tracker) = self.input.tracker() else {
+            *values = ChannelValues { position: 0, speed: 0, cams: 0, area: 0, reading: 0, ..*values };
+            return;
         };
-        let Some(tracker) = self.input.tracker() else { return fixed };
         if let Some(preset) = preset {
             self.position.preset(preset, tracker.shaft());
         }
@@ -167,15 +167,12 @@ impl Channel {
         let speed = self.speedometer.update(tracker.count());
         // At most 2^32.
         let range = self.position.scale().range().get().cast_signed();
-        ChannelValues {
-            position,
-            speed: speed_value(speed, self.speed_factor),
-            cams: self.cams.update(position),
-            area: area_state(&self.area, &self.module, position, range, self.input.native()),
-            offset: self.position.offset(),
-            reading: self.reading(position),
-            ..fixed
-        }
+        values.position = position;
+        values.speed = speed_value(speed, self.speed_factor);
+        values.cams = self.cams.update(position);
+        values.area = area_state(&self.area, &self.module, position, range, self.input.native());
+        values.offset = self.position.offset();
+        values.reading = self.reading(position);
     }
 
     /// The position that the readings would give, were they accepted.
