@@ -108,6 +108,7 @@ impl Protocol {
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
+        self.preset_by_input();
         let was_waiting = self.older_samples > 0;
         self.older_samples = self.older_samples.saturating_sub(1);
         let changed = self.shown.update(present(snapshot));
@@ -117,6 +118,17 @@ impl Protocol {
         let next = self.device.publish(now, out, NodeApplication::show_values);
         let can_store = was_waiting && self.older_samples == 0 && self.job.is_some();
         if can_store { Next { services: now, ..next } } else { next }
+    }
+
+    /// Carries out a preset by a digital input: the preset of the object is written again.
+    fn preset_by_input(&mut self) {
+        let mut preset = None;
+        self.device.show(|application, image| {
+            preset = application.profile.take_preset(image).map(|at| (at, application.value_at(at, image)));
+        });
+        if let Some((at, value)) = preset {
+            self.device.write_value(at, &value);
+        }
     }
 
     /// Handles expired PDO and SYNC timers.

@@ -423,6 +423,23 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::is_quiet`]($crate::profile::Profile::is_quiet).
+            #[must_use]
+            pub fn is_quiet(&self, place: usize) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.is_quiet(place),)+
+                }
+            }
+
+            /// As [`Profile::take_preset`]($crate::profile::Profile::take_preset).
+            pub fn take_preset(&mut self, image: &[u8]) -> Option<canopen::sdo::Multiplexer> {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.take_preset(image),)+
+                }
+            }
+
             /// As [`Profile::takes_all_nodes`]($crate::profile::Profile::takes_all_nodes).
             #[must_use]
             pub fn takes_all_nodes(&self, rpdo: u16) -> bool {

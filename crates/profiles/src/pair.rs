@@ -142,6 +142,14 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         }
     }
 
+    fn is_quiet(&self, place: usize) -> bool {
+        self.0.is_quiet(place) || self.1.is_quiet(place)
+    }
+
+    fn take_preset(&mut self, image: &[u8]) -> Option<Multiplexer> {
+        self.0.take_preset(image).or_else(|| self.1.take_preset(image))
+    }
+
     fn takes_all_nodes(&self, rpdo: u16) -> bool {
         self.0.takes_all_nodes(rpdo) || self.1.takes_all_nodes(rpdo)
     }

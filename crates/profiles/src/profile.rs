@@ -117,6 +117,17 @@ pub trait Profile: Sized {
         false
     }
 
+    /// Whether a change of the value at this place of the image is below its threshold
+    /// (`canopen::Application::is_quiet`).
+    fn is_quiet(&self, _place: usize) -> bool {
+        false
+    }
+
+    /// A preset by a digital input: the object to be written with its own value, as by a PDO.
+    fn take_preset(&mut self, _image: &[u8]) -> Option<Multiplexer> {
+        None
+    }
+
     /// Whether this multiplexed RPDO receives the frames of all nodes.
     fn takes_all_nodes(&self, _rpdo: u16) -> bool {
         false

@@ -6,7 +6,7 @@ use super::{
     ALARM_POSITION, ChannelParameters, ChannelValues, Limits, Parameters, RetainedChannel, RetainedState,
     Start,
 };
-use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
+use crate::board::{DIGITAL_INPUTS, Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 
 /// Output of the encoder for one sample.
@@ -30,6 +30,8 @@ pub struct Snapshot {
     pub operating_time: u32,
     /// The faults to be reported as emergencies.
     pub conditions: Conditions,
+    /// The digital inputs that are on.
+    pub digital: [bool; DIGITAL_INPUTS],
 }
 
 /// The whole measuring chain with its state.
@@ -152,6 +154,7 @@ impl Chain for Encoder {
 
     fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
         self.measure(&inputs.position, snapshot);
+        snapshot.digital = inputs.digital;
     }
 
     fn position_inputs(parameters: &Parameters) -> PositionInputs {

@@ -72,7 +72,7 @@ pub use input::{
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 pub use parameters::{
     AUTOMATIC, CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, HIGHEST_RATE,
-    HIGHEST_SPEED, Parameters, SCALING,
+    HIGHEST_SPEED, LongSpeed, Parameters, SCALING,
 };
 pub use position::Position;
 pub use retained_state::{OperatingTime, PositionRecord, RetainedChannel, RetainedState, Start};
@@ -82,6 +82,7 @@ pub use speed::{STANDSTILL, Speedometer, speed_value};
 pub use ssi::{Coding, Fault, Format, Parity, Reading};
 pub use supervision::{
     ALARM_COMMISSIONING, ALARM_POSITION, Conditions, Limits, SUPPORTED_ALARMS, SUPPORTED_WARNINGS,
-    WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
+    WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_SPEED,
+    WARNING_WATCHDOG,
 };
 pub use tracker::{ShaftPosition, Tracker};

@@ -1,6 +1,6 @@
 //! From native steps to measuring units: objects 6000h, 6001h, 6002h, 6005h:1, 6501h and 6502h.
 
-use core::num::{NonZeroU32, NonZeroU64};
+use core::num::{NonZeroU16, NonZeroU32, NonZeroU64};
 
 use super::ShaftPosition;
 use super::fraction::Fraction;
@@ -51,6 +51,8 @@ pub struct Settings {
     pub scaling: bool,
     /// Measuring units per revolution (6001h).
     pub per_revolution: u32,
+    /// Revolutions that have the units of 6001h (2114h).
+    pub gear: NonZeroU16,
     /// Total measuring range (6002h).
     pub range: u32,
     /// Measuring step of a linear encoder in nm (6005h:1), with and without the scaling function.
@@ -78,7 +80,13 @@ impl Scale {
             Native::Rotary { .. } if !settings.scaling => {
                 return Some(Scale::unscaled(native, settings.reversed));
             }
-            Native::Rotary { per_revolution, .. } => (settings.per_revolution, per_revolution),
+            Native::Rotary { per_revolution, .. } if settings.gear == NonZeroU16::MIN => {
+                (settings.per_revolution, per_revolution)
+            }
+            Native::Rotary { per_revolution, .. } => {
+                let turns = NonZeroU64::from(per_revolution).saturating_mul(settings.gear.into());
+                way(NonZeroU32::new(settings.per_revolution)?.into(), turns)?
+            }
             Native::Linear { step, .. } => way(step.into(), NonZeroU32::new(settings.step)?.into())?,
         };
         let range = if settings.scaling {
@@ -203,6 +211,13 @@ impl Scale {
     pub fn subtract(&self, a: u32, b: u32) -> u32 {
         let (a, b) = (u64::from(a), u64::from(b));
         low_word(if a >= b { a - b } else { a + self.range.get() - b })
+    }
+
+    /// The position so many units further.
+    #[must_use]
+    #[inline(never)]
+    pub(super) fn moved(&self, position: u32, units: i32) -> u32 {
+        self.add(position, low_word(self.modulo(units.into())))
     }
 
     /// The position value, computed with two divisions; [`Position`](super::Position) computes it faster for every

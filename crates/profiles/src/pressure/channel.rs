@@ -44,6 +44,8 @@ pub struct ChannelParameters {
     pub unit: Unit,
     /// 6124h, added to the process value in its unit.
     pub offset: f32,
+    /// 2210h, subtracted from the process value.
+    pub tare: f32,
     /// 6132h, decimal digits of the integer formats.
     pub digits: u8,
     /// Span of the REAL32 process value.
@@ -65,6 +67,7 @@ impl ChannelParameters {
             scaling_offset: 0.0,
             unit,
             offset: 0.0,
+            tare: 0.0,
             digits: 0,
             span,
             span16: Span { start: i16::MIN, end: i16::MAX },
@@ -130,7 +133,7 @@ impl Channel {
         let field_value = finite(field_value);
         let scaled = self.filter.next(field_value) * p.scaling_factor + p.scaling_offset;
         let in_unit = p.unit.of(scaled);
-        let process_value = finite(in_unit + p.offset);
+        let process_value = finite(in_unit + p.offset - p.tare);
         // In single precision on purpose: the nearest single to 0.29 times 100 is 29, while the same product in double
         // precision is 28.999999 and would be cut to 28.
         let shifted = process_value * self.shift;

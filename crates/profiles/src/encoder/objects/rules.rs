@@ -17,7 +17,7 @@ pub(super) enum Rule {
     Range,
     /// 6003h and 6010h: the position becomes the preset.
     Preset,
-    /// 2100h to 2103h: description of a sensor.
+    /// 2100h to 2103h, 2114h: description of a sensor and its gear.
     Sensor,
     /// 2107h: locked by 2108h.
     Factory,
@@ -29,7 +29,7 @@ impl Rule {
     /// The rule of an object.
     pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
         Some(match (index, sub) {
-            (0x2100..=0x2103, 1..) => Rule::Sensor,
+            (0x2100..=0x2103, 1..) | (0x2114, 0) => Rule::Sensor,
             (0x2107, 1..) => Rule::Factory,
             (0x2109, 0) => Rule::Acknowledge,
             (0x6000, 0) => Rule::Operating,

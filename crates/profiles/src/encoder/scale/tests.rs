@@ -21,7 +21,7 @@ fn linear(step: u32) -> Native {
 }
 
 fn scaled(per_revolution: u32, range: u32) -> Settings {
-    Settings { reversed: false, scaling: true, per_revolution, range, step: 1 }
+    Settings { reversed: false, scaling: true, per_revolution, gear: NonZeroU16::MIN, range, step: 1 }
 }
 
 fn any_settings() -> impl Strategy<Value = (Native, Settings)> {
@@ -30,7 +30,7 @@ fn any_settings() -> impl Strategy<Value = (Native, Settings)> {
     prop_oneof![3 => shaft, 1 => rod].prop_flat_map(|native| {
         (1..=u32::MAX, 1..=u32::MAX, 1..=u32::MAX, any::<bool>(), any::<bool>()).prop_map(
             move |(per_revolution, step, range, reversed, scaling)| {
-                (native, Settings { reversed, scaling, per_revolution, range, step })
+                (native, Settings { reversed, scaling, per_revolution, gear: NonZeroU16::MIN, range, step })
             },
         )
     })
@@ -177,7 +177,14 @@ fn a_way_needs_a_step_that_the_sensor_resolves() {
 /// A client that multiplies a position by 6005h:1 gets the travel, whatever bit 2 of 6000h and the sensor are.
 #[test]
 fn a_measuring_step_acts_without_the_scaling_function_and_may_be_finer_than_the_sensor() {
-    let settings = |step| Settings { reversed: false, scaling: false, per_revolution: 1, range: 1, step };
+    let settings = |step| Settings {
+        reversed: false,
+        scaling: false,
+        per_revolution: 1,
+        gear: NonZeroU16::MIN,
+        range: 1,
+        step,
+    };
     for (own, step) in
         [(1000, 10_000), (1000, 1000), (10_000, 1000), (4096, 999), (4096, 1), (4_000_000_000, 7)]
     {
@@ -192,4 +199,25 @@ fn a_measuring_step_acts_without_the_scaling_function_and_may_be_finer_than_the_
         }
     }
     assert_eq!(Scale::new(&linear(1000), &settings(0)), None);
+}
+
+/// A table with 3600 units behind a gear of 10 to 3: 10,800 units in 10 revolutions of the sensor, without end.
+#[test]
+fn a_gear_factor_makes_an_endless_axis_of_revolutions_that_do_not_divide() {
+    let gear = |per_revolution, revolutions, range| {
+        let gear = NonZeroU16::new(revolutions).unwrap();
+        Scale::new(&rotary(8192, 4096), &Settings { gear, ..scaled(per_revolution, range) })
+    };
+    let table = gear(10_800, 10, 3600).unwrap();
+    for total in [0_i64, 8191, 27_306, 27_307, 81_920, -1, -81_920, 123_456_789_012] {
+        let expected = (i128::from(total) * 10_800).div_euclid(81_920).rem_euclid(3600);
+        assert_eq!(i128::from(table.value(shaft_at(total, &table), 0)), expected, "{total}");
+    }
+    assert!(!table.repeats_after(1 << 25), "the code is no whole number of turns of the table");
+    assert!(table.repeats_after(81_920), "ten revolutions are three turns");
+    assert!(
+        gear(3600, 4096, 3600).unwrap().repeats_after(1 << 25),
+        "one turn of the table is the whole code"
+    );
+    assert_eq!(gear(0, 10, 3600), None);
 }

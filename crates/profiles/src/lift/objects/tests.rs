@@ -242,7 +242,7 @@ fn units_take_their_sensor_where_the_table_says() {
     node.write(0x6382, 3, 1).unwrap();
     node.write(0x2301, 3, 2).unwrap();
     assert_eq!(node.read(0x2302, 3), 0, "the offset belonged to the other sensor");
-    assert_eq!(node.read(0x63C4, 1), 0x2D);
+    assert_eq!(node.read(0x63C4, 1), 0x102D);
 }
 
 #[test]

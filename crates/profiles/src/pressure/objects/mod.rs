@@ -3,6 +3,7 @@
 pub(crate) mod calibration;
 mod device_profile;
 mod faults;
+mod functions;
 mod manufacturer;
 mod pdos;
 mod rules;
@@ -12,6 +13,8 @@ pub(crate) use calibration::{CALIBRATION, Places};
 pub(crate) use device_profile::{INTEGER, REAL};
 pub use faults::FAULTS;
 pub(crate) use faults::SENSOR_BREAK;
+use functions::States;
+pub(crate) use functions::{ALARM_BLOCK, EXTREMES};
 pub(crate) use manufacturer::{STATUS_AND_USER, STATUS_REGISTER};
 pub use values::Fields;
 
@@ -36,8 +39,10 @@ pub const ROWS: &[&[Object]] = &[
     &error_behaviour(0),
     &PDOS,
     CALIBRATION,
+    EXTREMES,
     STATUS_AND_USER,
     REAL,
+    ALARM_BLOCK,
     INTEGER,
 ];
 
@@ -64,6 +69,7 @@ pub struct Objects {
     fields: &'static Fields,
     /// The process value of each channel without its offset, from an intact sensor.
     measured: [Option<f32>; 2],
+    states: States,
 }
 
 impl Profile for Objects {
@@ -74,7 +80,7 @@ impl Profile for Objects {
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, measured: [None; 2] }
+        Objects { fields, measured: [None; 2], states: States::default() }
     }
 
     fn initialise(&mut self, image: &mut [u8], stored: Groups) {
@@ -90,6 +96,19 @@ impl Profile for Objects {
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
         self.measured = [snapshot.pressure.measured, snapshot.temperature.measured];
         self.fields.publish(snapshot, image);
+        let values = [&snapshot.pressure, &snapshot.temperature];
+        self.fields.functions.follow(values, &mut self.states, image);
+    }
+
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        let index = entry.index();
+        let index = if index < 0x6000 { index } else { index.wrapping_sub(self.fields.shift) };
+        let value = entry.field().u8(image);
+        self.fields.functions.written(index, entry.sub(), value, &mut self.states);
+    }
+
+    fn is_quiet(&self, place: usize) -> bool {
+        self.fields.is_quiet(&self.states, place)
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {
