@@ -190,14 +190,14 @@ fn a_long_speed_value_has_its_unit_and_its_average_and_the_short_one_says_that_i
     }
 }
 
-/// A cam from 1000 to 2000, at 100 steps a millisecond and a delay of 5 ms: it switches 500 steps earlier, both ways
+/// A cam from 1050 to 2050, at 100 steps a millisecond and a delay of 5 ms: it switches 500 steps earlier, both ways
 /// and across zero.
 #[test]
 fn cams_compensate_their_delay() {
     for (low, high, start, step, on) in [
-        (1000, 2000, 0, 100, 500..=1500),
-        (1000, 2000, 3000, -100, 1500..=2500),
-        (100, 300, -3000, 100, -400..=-200),
+        (1050, 2050, 0, 100, 550..=1550),
+        (1050, 2050, 3000, -100, 1550..=2550),
+        (150, 350, -3000, 100, -350..=-150),
     ] {
         let mut parameters = one(SensorType::IncrementalCounted);
         let cam = Cam { low, high, hysteresis: 0 };
@@ -206,6 +206,7 @@ fn cams_compensate_their_delay() {
         own.cam_delay = 50;
         parameters.index = false;
         let mut bench = Bench::new(parameters);
+        bench.stay();
         bench.go(start - 20 * step);
         for millis in -19..30 {
             let at = start + millis * step;
