@@ -104,11 +104,11 @@ impl Protocol {
     /// the process data that is due. Without a snapshot only due process data is sent. When a job of `take_job` no longer
     /// waits for samples, the services are due at once.
     pub fn publish(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        self.preset_by_input();
         let snapshot = &self.device.application().snapshot;
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
-        self.preset_by_input();
         let was_waiting = self.older_samples > 0;
         self.older_samples = self.older_samples.saturating_sub(1);
         let changed = self.shown.update(present(snapshot));
