@@ -96,6 +96,12 @@ impl NodeApplication {
         }
     }
 
+    /// The four bytes of an object.
+    pub(crate) fn value_at(&self, at: Multiplexer, image: &[u8]) -> [u8; 4] {
+        let entry = self.setup.personality.dictionary().find(at.index, at.sub);
+        entry.map_or([0; 4], |entry| entry.field().load(image))
+    }
+
     pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
         if let Ok(entry) = self.setup.personality.dictionary().find(index, sub) {
             entry.field().set(image, bytes);
@@ -124,8 +130,11 @@ impl Application for NodeApplication {
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
         show(0x1F57, 1, &status.to_le_bytes());
         self.adopt_older_choice(image);
-        let is_stored = !self.stored.get(Group::Communication).packed.is_empty();
-        self.profile.initialise(image, is_stored);
+        let mut stored = Groups::NONE;
+        for group in Group::ALL {
+            stored.set(group, !self.stored.get(group).packed.is_empty());
+        }
+        self.profile.initialise(image, stored);
         self.show_personality(image);
         self.show_flags(image);
         self.show_lost_events(image);
@@ -177,6 +186,10 @@ impl Application for NodeApplication {
 
     fn sends_events(&self, tpdo: u16) -> bool {
         self.profile.sends_events(tpdo)
+    }
+
+    fn is_quiet(&self, place: usize) -> bool {
+        self.profile.is_quiet(place)
     }
 
     fn stores(&self, entry: &Entry) -> Option<Groups> {

@@ -104,6 +104,7 @@ impl Protocol {
     /// the process data that is due. Without a snapshot only due process data is sent. When a job of `take_job` no longer
     /// waits for samples, the services are due at once.
     pub fn publish(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        self.preset_by_input();
         let snapshot = &self.device.application().snapshot;
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
@@ -117,6 +118,17 @@ impl Protocol {
         let next = self.device.publish(now, out, NodeApplication::show_values);
         let can_store = was_waiting && self.older_samples == 0 && self.job.is_some();
         if can_store { Next { services: now, ..next } } else { next }
+    }
+
+    /// Carries out a preset by a digital input: the preset of the object is written again.
+    fn preset_by_input(&mut self) {
+        let mut preset = None;
+        self.device.show(|application, image| {
+            preset = application.profile.take_preset(image).map(|at| (at, application.value_at(at, image)));
+        });
+        if let Some((at, value)) = preset {
+            self.device.write_value(at, &value);
+        }
     }
 
     /// Handles expired PDO and SYNC timers.

@@ -299,10 +299,10 @@ macro_rules! personalities {
             }
 
             /// As [`Profile::initialise`]($crate::profile::Profile::initialise).
-            pub fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
+            pub fn initialise(&mut self, image: &mut [u8], stored: canopen::dictionary::Groups) {
                 use $crate::profile::Profile;
                 match self {
-                    $(AnyProfile::$Name(own) => own.initialise(image, is_stored),)+
+                    $(AnyProfile::$Name(own) => own.initialise(image, stored),)+
                 }
             }
 
@@ -429,6 +429,23 @@ macro_rules! personalities {
                 use $crate::profile::Profile;
                 match self {
                     $(AnyProfile::$Name(own) => own.next_event(tpdo, image),)+
+                }
+            }
+
+            /// As [`Profile::is_quiet`]($crate::profile::Profile::is_quiet).
+            #[must_use]
+            pub fn is_quiet(&self, place: usize) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.is_quiet(place),)+
+                }
+            }
+
+            /// As [`Profile::take_preset`]($crate::profile::Profile::take_preset).
+            pub fn take_preset(&mut self, image: &[u8]) -> Option<canopen::sdo::Multiplexer> {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.take_preset(image),)+
                 }
             }
 

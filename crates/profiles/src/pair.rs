@@ -1,7 +1,7 @@
 //! Two profiles in one dictionary, as one profile.
 
 use canopen::ErrorClass;
-use canopen::dictionary::Entry;
+use canopen::dictionary::{Entry, Groups};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 
@@ -57,9 +57,9 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         Pair(A::new(first), B::new(second))
     }
 
-    fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
-        self.0.initialise(image, is_stored);
-        self.1.initialise(image, is_stored);
+    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
+        self.0.initialise(image, stored);
+        self.1.initialise(image, stored);
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters<Self> {
@@ -144,6 +144,14 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         } else {
             self.1.next_event(tpdo, image)
         }
+    }
+
+    fn is_quiet(&self, place: usize) -> bool {
+        self.0.is_quiet(place) || self.1.is_quiet(place)
+    }
+
+    fn take_preset(&mut self, image: &[u8]) -> Option<Multiplexer> {
+        self.0.take_preset(image).or_else(|| self.1.take_preset(image))
     }
 
     fn takes_all_nodes(&self, rpdo: u16) -> bool {

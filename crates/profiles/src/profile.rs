@@ -7,7 +7,7 @@
 //! ```
 
 use canopen::ErrorClass;
-use canopen::dictionary::Entry;
+use canopen::dictionary::{Entry, Groups};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 
@@ -56,8 +56,8 @@ pub trait Profile: Sized {
     fn new(fields: &'static Self::Fields) -> Self;
 
     /// Fills in the values that the table cannot have, after every reset: those that depend on the identity and on the
-    /// parameters. `is_stored`: the communication parameters in the image were stored by a client, and are no defaults.
-    fn initialise(&mut self, _image: &mut [u8], _is_stored: bool) {}
+    /// parameters. `stored`: the groups in the image that a client has stored, and that are no defaults.
+    fn initialise(&mut self, _image: &mut [u8], _stored: Groups) {}
 
     /// The parameters in the image. An impossible value acts as a valid one.
     fn parameters(&self, image: &[u8]) -> Parameters<Self>;
@@ -120,6 +120,17 @@ pub trait Profile: Sized {
     /// Puts the next event of this TPDO into the image; returns whether there was one.
     fn next_event(&mut self, _tpdo: u16, _image: &mut [u8]) -> bool {
         false
+    }
+
+    /// Whether a change of the value at this place of the image is below its threshold
+    /// (`canopen::Application::is_quiet`).
+    fn is_quiet(&self, _place: usize) -> bool {
+        false
+    }
+
+    /// A preset by a digital input: the object to be written with its own value, as by a PDO.
+    fn take_preset(&mut self, _image: &[u8]) -> Option<Multiplexer> {
+        None
     }
 
     /// Whether this multiplexed RPDO receives the frames of all nodes.

@@ -253,3 +253,51 @@ fn an_encoder_that_does_not_answer_is_an_emergency_and_an_alarm() {
     assert_eq!(number(&mut bench, 0x6503, 0), 1);
     assert_eq!(bench.protocol.state(), State::Operational, "1029h:2 is 1");
 }
+
+/// TPDO 1 as type 255 with a threshold of 100 units: it is sent when the position is 100 units from the last one sent,
+/// and 6004h is right in between.
+#[test]
+fn a_tpdo_of_type_255_waits_for_the_change_threshold() {
+    let mut bench = booted();
+    turn_to(&mut bench, 0);
+    bench.write(0x1800, 2, &[255]).unwrap();
+    bench.write(0x2112, 1, &100_u32.to_le_bytes()).unwrap();
+    bench.nmt(1);
+    turn_to(&mut bench, 0);
+    bench.take();
+    for counter in (1..=250_u16).chain((1..250).rev()) {
+        turn_to(&mut bench, counter);
+        assert_eq!(number(&mut bench, 0x6004, 0), counter.into());
+    }
+    assert_eq!(positions(&mut bench, TPDO1), [100, 200, 100]);
+    bench.write(0x2112, 1, &[0; 4]).unwrap();
+    turn_to(&mut bench, 2);
+    turn_to(&mut bench, 3);
+    assert_eq!(positions(&mut bench, TPDO1), [2, 3], "each change");
+}
+
+/// The preset of 6003h by a button: once a press, stored, and not by a button that was pressed before.
+#[test]
+fn a_digital_input_makes_a_preset_that_outlives_a_loss_of_power() {
+    let mut bench = booted();
+    turn_to(&mut bench, 0);
+    bench.buttons = [true, false];
+    turn_to(&mut bench, 500);
+    bench.write(0x2115, 1, &[1]).unwrap();
+    bench.write(0x6003, 0, &7000_u32.to_le_bytes()).unwrap();
+    turn_to(&mut bench, 600);
+    wait(&mut bench, 5);
+    assert_eq!(number(&mut bench, 0x6004, 0), 7100, "it was pressed when it was chosen");
+    bench.buttons = [false, false];
+    wait(&mut bench, 5);
+    bench.buttons = [true, true];
+    turn_to(&mut bench, 700);
+    wait(&mut bench, 150);
+    assert_eq!((number(&mut bench, 0x6004, 0), number(&mut bench, 0x6020, 1)), (7000, 7000));
+    turn_to(&mut bench, 750);
+    wait(&mut bench, 150);
+    assert_eq!(number(&mut bench, 0x6004, 0), 7050);
+    let mut bench = bench.power_cycled();
+    wait(&mut bench, 5);
+    assert_eq!((number(&mut bench, 0x6004, 0), number(&mut bench, 0x6503, 0)), (7050, 0));
+}

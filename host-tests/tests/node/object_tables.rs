@@ -79,6 +79,7 @@ fn writing_is_refused_or_taken_as_the_access_says() {
         }
         let value = match row.index {
             0x6125 | 0x6925 => b"zero".to_vec(),
+            0x6139 | 0x6939 => b"tare".to_vec(),
             0x1010 | 0x2204 => b"save".to_vec(),
             0x1011 => b"load".to_vec(),
             0x2002 if row.sub == 2 => b"back".to_vec(),
@@ -94,7 +95,7 @@ fn writing_is_refused_or_taken_as_the_access_says() {
             // There is no second encoder.
             (0x6010, 2) => Err(DEVICE_STATE),
             // No value has been measured yet.
-            (0x6382 | 0x6125 | 0x6925, _) => Err(DEVICE_STATE),
+            (0x6382 | 0x6125 | 0x6925 | 0x6139 | 0x6939, _) => Err(DEVICE_STATE),
             // The program is not on trial.
             (0x2002, 2) => Err(DEVICE_STATE),
             // The bootloader has no key, so no response can be valid.

@@ -104,6 +104,51 @@ fn autozero_moves_the_offset_until_the_value_is_zero() {
     assert!(real(&mut bench, 0x6130, 2) > 20.0);
 }
 
+/// The former offset leaves no rest, however large the value is.
+#[test]
+fn autozero_gives_exactly_zero_after_an_old_offset() {
+    let mut bench = Bench::booted();
+    for offset in [123.0_f32, -0.1, 1e-3] {
+        bench.write(0x6124, 1, &offset.to_le_bytes()).unwrap();
+        bench.sample(&raw(876_543.0, 298.15));
+        bench.write(0x6125, 1, b"zero").unwrap();
+        bench.sample(&raw(876_543.0, 298.15));
+        assert_eq!(real(&mut bench, 0x6130, 1), 0.0, "{offset}");
+    }
+}
+
+fn span(bench: &mut Bench) -> (f32, f32) {
+    (real(bench, 0x6148, 1), real(bench, 0x6149, 1))
+}
+
+/// CMP 8271 gives $PRESSURE MIN and $PRESSURE MAX as the defaults of 6148h and 6149h.
+#[test]
+fn the_default_span_is_the_range_of_the_transducer() {
+    let mut bench = Bench::booted();
+    assert_eq!(span(&mut bench), (0.0, 10.0));
+    bench.write(0x2203, 0, b"cali").unwrap();
+    bench.write(0x2200, 2, &40e6_f32.to_le_bytes()).unwrap();
+    bench.write(0x2200, 1, &(-1e5_f32).to_le_bytes()).unwrap();
+    assert_eq!(span(&mut bench), (-1.0, 400.0));
+    bench.write(0x2204, 0, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(span(&mut bench), (-1.0, 400.0));
+    bench.sample(&raw(250_000.0, 298.15));
+    assert_eq!(bench.read(0x6150, 1).unwrap()[0], 0);
+
+    // A span that a client has chosen stays.
+    bench.write(0x6149, 1, &10_f32.to_le_bytes()).unwrap();
+    bench.write(0x1010, 3, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(span(&mut bench), (-1.0, 10.0));
+    bench.write(0x2203, 0, b"cali").unwrap();
+    bench.write(0x2200, 2, &2e6_f32.to_le_bytes()).unwrap();
+    assert_eq!(span(&mut bench), (-1.0, 10.0));
+    bench.write(0x1011, 3, b"load").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(span(&mut bench), (-1.0, 400.0), "2 MPa was not saved");
+}
+
 /// An absolute pressure in Pa does not fit INTEGER16, but the sensor is well.
 #[test]
 fn autozero_is_possible_though_an_integer_is_clipped() {
@@ -275,4 +320,108 @@ fn a_remote_frame_is_answered_with_the_live_values() {
     let frames = bench.take();
     let pressure = bench.read(0x6130, 1).unwrap();
     assert!(matches!(&frames[..], [(TPDO1, data)] if data[..4] == pressure[..]), "{frames:?}");
+}
+
+fn bits(bench: &mut Bench, index: u16, sub: u8) -> u8 {
+    bench.read(index, sub).unwrap()[0]
+}
+
+fn measure(bench: &mut Bench, bar: f64) {
+    bench.sample(&raw(bar * 100_000.0, 298.15));
+}
+
+#[test]
+fn a_tare_is_subtracted_until_the_next_autozero() {
+    let mut bench = Bench::booted();
+    bench.write(0x6124, 1, &0.1_f32.to_le_bytes()).unwrap();
+    measure(&mut bench, 3.3);
+    assert_eq!(bench.write(0x6139, 1, b"zero"), Err(0x0800_0020));
+    bench.write(0x6139, 1, b"tare").unwrap();
+    measure(&mut bench, 3.3);
+    assert_eq!(real(&mut bench, 0x6130, 1), 0.0);
+    assert!(is_close(real(&mut bench, 0x2210, 1), 3.4, 1e-3) && real(&mut bench, 0x6124, 1) == 0.1);
+    measure(&mut bench, 4.3);
+    assert!(is_close(real(&mut bench, 0x6130, 1), 1.0, 1e-3));
+    bench.write(0x6125, 1, b"zero").unwrap();
+    measure(&mut bench, 4.3);
+    assert_eq!((real(&mut bench, 0x6130, 1), real(&mut bench, 0x2210, 1)), (0.0, 0.0));
+}
+
+#[test]
+fn lowest_and_highest_value_are_kept_until_they_are_restarted() {
+    let mut bench = Bench::booted();
+    for bar in [2.0, 5.0, 1.0, 3.0] {
+        measure(&mut bench, bar);
+    }
+    let mut broken = raw(0.0, 298.15);
+    broken.pressure = 0;
+    bench.sample(&broken);
+    let extremes = |bench: &mut Bench| (real(bench, 0x2211, 1).round(), real(bench, 0x2212, 1).round());
+    assert_eq!(extremes(&mut bench), (1.0, 5.0), "a value at a rail does not count");
+    (0..1100).for_each(|_| measure(&mut bench, 3.0));
+    bench.write(0x2213, 0, &[1]).unwrap();
+    measure(&mut bench, 4.0);
+    assert_eq!(extremes(&mut bench), (4.0, 4.0));
+    bench.write(0x6131, 1, &0x0322_0000_u32.to_le_bytes()).unwrap();
+    measure(&mut bench, 4.0);
+    measure(&mut bench, 4.0);
+    assert!(real(&mut bench, 0x2211, 1) >= 4.0, "another unit begins anew");
+}
+
+#[test]
+fn an_alarm_has_a_hysteresis_and_stays_until_its_reset_if_it_is_latched() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.write(0x6503, 1, &0x6150_0108_u32.to_le_bytes()), Err(0x0609_0030));
+    for (alarm, kind, action, limit) in [(1, 1, 0, 5.0_f32), (2, 1, 1, 5.0), (3, 2, 0, 2.0)] {
+        bench.write(0x6503, alarm, &0x6130_0120_u32.to_le_bytes()).unwrap();
+        bench.write(0x6508, alarm, &[kind]).unwrap();
+        bench.write(0x6509, alarm, &[action]).unwrap();
+        bench.write(0x650A, alarm, &limit.to_le_bytes()).unwrap();
+        bench.write(0x650B, alarm, &0.5_f32.to_le_bytes()).unwrap();
+    }
+    for (bar, states) in [(4.9, 0), (5.1, 3), (4.6, 3), (4.4, 2), (4.9, 2), (1.9, 6), (2.4, 6), (2.6, 2)] {
+        measure(&mut bench, bar);
+        assert_eq!(bits(&mut bench, 0x6600, 1), states, "{bar}");
+        assert_eq!(
+            [1, 2, 3, 4].map(|n| bits(&mut bench, 0x650D, n)),
+            [1, 2, 4, 8].map(|b| u8::from(states & b != 0))
+        );
+    }
+    assert_eq!(bits(&mut bench, 0x6602, 0), 1);
+    bench.write(0x650E, 2, &[1]).unwrap();
+    measure(&mut bench, 2.6);
+    assert_eq!((bits(&mut bench, 0x6600, 1), bits(&mut bench, 0x6602, 0)), (0, 0));
+    for (index, sub, value) in [(0x6610, 0, 1), (0x6611, 1, 2)] {
+        measure(&mut bench, 6.0);
+        bench.write(index, sub, &[value]).unwrap();
+        measure(&mut bench, 6.0);
+        assert_eq!(bits(&mut bench, 0x6600, 1), 3, "a reset does not end what is still there");
+        measure(&mut bench, 3.0);
+        bench.write(index, sub, &[value]).unwrap();
+        measure(&mut bench, 3.0);
+        assert_eq!(bits(&mut bench, 0x6600, 1), 0, "{index:X}h");
+    }
+}
+
+/// 6133h: TPDO 1 of type 255 without its event timer.
+#[test]
+fn a_tpdo_waits_for_the_interrupt_delta() {
+    let mut bench = Bench::booted();
+    bench.write(0x1800, 5, &[0, 0]).unwrap();
+    for sub in 1..=2 {
+        bench.write(0x6133, sub, &0.25_f32.to_le_bytes()).unwrap();
+    }
+    measure(&mut bench, 1.0);
+    bench.nmt(1);
+    measure(&mut bench, 1.0);
+    bench.take();
+    let sent = |bench: &mut Bench| bench.take().iter().filter(|(id, _)| *id == TPDO1).count();
+    for step in 0..=20 {
+        measure(&mut bench, 1.0 + f64::from(step) * 0.01);
+    }
+    assert_eq!(sent(&mut bench), 0);
+    measure(&mut bench, 1.26);
+    assert_eq!(sent(&mut bench), 1);
+    measure(&mut bench, 1.1);
+    assert_eq!((sent(&mut bench), (real(&mut bench, 0x6130, 1) * 10.0).round()), (0, 11.0));
 }

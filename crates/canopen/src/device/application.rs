@@ -126,6 +126,13 @@ pub trait Application {
         false
     }
 
+    /// Whether a change of the value at this place of the image is too small for a TPDO of type 255, such as a change
+    /// below the threshold of a measured value. The TPDO is sent with the next change that is large enough. Called
+    /// after each [`publish`](crate::Device::publish) for the bytes that have changed since the TPDO was sent.
+    fn is_quiet(&self, _place: usize) -> bool {
+        false
+    }
+
     /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response
     /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, the write is
     /// refused and has no effect.

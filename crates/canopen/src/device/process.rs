@@ -7,8 +7,9 @@ use super::{Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::nmt::Command;
 use crate::pdo::{Chain, ProcessContext, Tpdo};
+use crate::sdo::Multiplexer;
 use crate::time_stamp::TimeOfDay;
-use crate::{CanId, Frame, Instant, Span, Tick, Transmit};
+use crate::{Application, CanId, Frame, Instant, Span, Tick, Transmit};
 
 impl<D: Definition> Device<D> {
     /// Takes a frame for either half.
@@ -104,6 +105,13 @@ impl<D: Definition> Device<D> {
         self.process_next()
     }
 
+    /// Writes a value for the application, with the checks and effects of a value received by PDO. Returns whether the
+    /// object accepts it. To be called before [`publish`](Device::publish), which gives the deadlines that follow.
+    pub fn write_value(&mut self, at: Multiplexer, bytes: &[u8]) -> bool {
+        let entry = self.inner.dictionary.find(at.index, at.sub);
+        entry.is_ok_and(|entry| self.inner.store_process_value(&entry, bytes))
+    }
+
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is
     /// the number of the TPDO, 1 to 512. A TPDO that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
@@ -131,7 +139,9 @@ impl<D: Definition> Device<D> {
         let context = &mut self.services.process_context(now, out);
         self.inner.self_start(context);
         if self.inner.state.has_pdos() {
-            self.inner.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, context));
+            self.inner.each_tpdo(Chain::Valid, |tpdo, image, application| {
+                tpdo.on_change(image, |place| application.is_quiet(place), context);
+            });
             let events_due = self.inner.send_events(context);
             self.inner.process_due = self.inner.process_due.min(events_due);
             if Inner::<D>::has(Services::MULTIPLEXED_TPDO) {
@@ -211,7 +221,7 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::SYNC) && self.sync.accepts(frame) {
             self.on_sync(frame, context);
         } else if frame.is_remote() {
-            self.each_tpdo(Chain::Valid, |tpdo, image| {
+            self.each_tpdo(Chain::Valid, |tpdo, image, _| {
                 if tpdo.requested().is_some_and(|id| id.get() == frame.id()) {
                     tpdo.on_remote(image, context);
                 }
@@ -222,10 +232,14 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Visits the TPDOs of a chain. A TPDO that could not be sent at once makes the process data due.
-    pub(super) fn each_tpdo(&mut self, chain: Chain, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+    pub(super) fn each_tpdo(
+        &mut self,
+        chain: Chain,
+        mut visit: impl FnMut(&mut Tpdo, &[u8], &D::Application),
+    ) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.as_mut().get_mut(links.next(chain)) {
-            visit(tpdo, self.image.as_ref());
+            visit(tpdo, self.image.as_ref(), &self.application);
             if tpdo.is_pending() {
                 self.process_due = STALE;
             }
@@ -242,7 +256,7 @@ impl<D: Definition> Inner<D> {
             self.poll_sync(context.now);
         }
         let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Tick::NEVER };
-        self.each_tpdo(Chain::Valid, |tpdo, image| {
+        self.each_tpdo(Chain::Valid, |tpdo, image, _| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });

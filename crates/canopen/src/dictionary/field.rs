@@ -46,6 +46,12 @@ impl Field {
         rest.fill(0);
     }
 
+    /// Whether the value takes this place of the image.
+    #[must_use]
+    pub fn is_at(self, place: usize) -> bool {
+        (usize::from(self.offset)..usize::from(self.end())).contains(&place)
+    }
+
     /// The offset after the value. Saturates for a field outside every image.
     pub(crate) fn end(self) -> u16 {
         self.offset.saturating_add(self.size.into())

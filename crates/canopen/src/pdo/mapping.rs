@@ -100,6 +100,11 @@ impl Layout {
         self.places().iter().any(|place| (place.offset..place.end()).contains(&field.offset))
     }
 
+    /// The place in the image of each byte of the PDO.
+    pub(crate) fn offsets(&self) -> impl Iterator<Item = usize> {
+        self.places().iter().flat_map(|place| usize::from(place.offset)..usize::from(place.end()))
+    }
+
     /// Length of the PDO in bytes.
     pub(crate) fn len(&self) -> u8 {
         self.len

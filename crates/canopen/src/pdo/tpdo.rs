@@ -278,9 +278,16 @@ impl Tpdo {
         self.pending |= self.is_valid && self.settings.transmission.is_event_driven();
     }
 
-    /// Sends the values if a mapped value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
-        if self.settings.sends_on_change() && self.has_changed(image) {
+    /// Sends the values if a mapped value has changed. `is_quiet`: whether a change at this place of the image is too
+    /// small to be sent.
+    #[inline]
+    pub(crate) fn on_change(
+        &mut self,
+        image: &[u8],
+        is_quiet: impl Fn(usize) -> bool,
+        context: &mut ProcessContext<'_, impl Transmit>,
+    ) {
+        if self.settings.sends_on_change() && self.has_changed(image) && self.is_worth(image, is_quiet) {
             self.pending = true;
             self.poll(image, context);
         }
@@ -293,6 +300,13 @@ impl Tpdo {
         // An event is kept: the application does not give it again.
         self.pending &= self.events_of().is_some()
             || !matches!(kind, Transmission::SyncAcyclic | Transmission::SyncCyclic(_));
+    }
+
+    /// Whether one of the changes is to be sent.
+    fn is_worth(&self, image: &[u8], is_quiet: impl Fn(usize) -> bool) -> bool {
+        let Some(sent) = self.data else { return true };
+        let bytes = self.settings.layout.gather(image).into_iter().zip(sent);
+        bytes.zip(self.settings.layout.offsets()).any(|((now, sent), place)| now != sent && !is_quiet(place))
     }
 
     fn has_changed(&self, image: &[u8]) -> bool {

@@ -33,6 +33,8 @@ const ENCODER_TYPE: Object = device_type(
 const PRESSURE_TYPE: Object = device_type(0x6FFF, "Device type 2", pressure::objects::DEVICE_TYPE);
 
 static REAL: [Object; pressure::objects::REAL.len()] = shift::shifted(pressure::objects::REAL);
+static ALARM_BLOCK: [Object; pressure::objects::ALARM_BLOCK.len()] =
+    shift::shifted(pressure::objects::ALARM_BLOCK);
 static INTEGER: [Object; pressure::objects::INTEGER.len()] = shift::shifted(pressure::objects::INTEGER);
 
 /// The rows of both devices, without the rows that all devices have.
@@ -46,10 +48,12 @@ pub const ROWS: &[&[Object]] = &[
     tpdo_mappings(&pdos::TPDOS).as_flattened(),
     encoder::objects::SENSORS,
     pressure::objects::CALIBRATION,
+    pressure::objects::EXTREMES,
     pressure::objects::STATUS_AND_USER,
     &encoder::objects::PROFILE,
     &[ENCODER_TYPE],
     &REAL,
+    &ALARM_BLOCK,
     &[PRESSURE_TYPE],
     &INTEGER,
 ];

@@ -6,7 +6,7 @@ use super::{
     ALARM_POSITION, ChannelParameters, ChannelValues, Limits, Parameters, RetainedChannel, RetainedState,
     Start,
 };
-use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
+use crate::board::{DIGITAL_INPUTS, Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 
 /// Output of the encoder for one sample.
@@ -30,6 +30,8 @@ pub struct Snapshot {
     pub operating_time: u32,
     /// The faults to be reported as emergencies.
     pub conditions: Conditions,
+    /// The digital inputs that are on.
+    pub digital: [bool; DIGITAL_INPUTS],
 }
 
 /// The whole measuring chain with its state.
@@ -87,10 +89,14 @@ impl Encoder {
                 self.channels.iter_mut().flatten().for_each(Channel::believe);
             }
         }
-        *snapshot = self.fixed;
-        for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
-            if let Some(channel) = channel {
-                *values = channel.sample(raw);
+        let fixed = &self.fixed;
+        snapshot.operating_status = fixed.operating_status;
+        (snapshot.resolution, snapshot.revolutions) = (fixed.resolution, fixed.revolutions);
+        let channels = self.channels.iter_mut().zip(&fixed.channels);
+        for (values, (channel, unused)) in snapshot.channels.iter_mut().zip(channels) {
+            match channel {
+                Some(channel) => channel.sample(raw, values),
+                None => *values = *unused,
             }
         }
         let (channels, limits, time) = (&snapshot.channels, &self.limits, self.retained.operating_time);
@@ -148,6 +154,7 @@ impl Chain for Encoder {
 
     fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
         self.measure(&inputs.position, snapshot);
+        snapshot.digital = inputs.digital;
     }
 
     fn position_inputs(parameters: &Parameters) -> PositionInputs {

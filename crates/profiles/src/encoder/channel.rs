@@ -3,7 +3,7 @@
 use super::area::area_state;
 use super::commissioning::Commissioning;
 use super::input::Input;
-use super::speed::speed_value;
+use super::speed::{rounded, speed_value};
 use super::trust::ALL;
 use super::{
     Area, CamChannel, ChannelParameters, Command, Module, Parameters, Position, Progress, RetainedChannel,
@@ -18,6 +18,8 @@ pub struct ChannelValues {
     pub position: u32,
     /// Speed value (6030h).
     pub speed: i16,
+    /// Long speed value (2110h).
+    pub long_speed: i32,
     /// Cam state register (6300h).
     pub cams: u8,
     /// Area state register (6400h).
@@ -70,6 +72,13 @@ pub(super) struct Channel {
     position: Position,
     speedometer: Speedometer,
     speed_factor: f32,
+    /// Units of the long speed value per step and second.
+    long_factor: f32,
+    /// Part of a new speed in the average.
+    share: f32,
+    average: f32,
+    /// Units by which the cams are ahead, per step and second; 0 without compensation.
+    lead: f32,
     cams: CamChannel,
     area: Area,
     module: Module,
@@ -97,6 +106,10 @@ impl Channel {
             position: Position::new(scale, offset),
             speedometer: Speedometer::new(0),
             speed_factor: 0.0,
+            long_factor: 0.0,
+            share: 1.0,
+            average: 0.0,
+            lead: 0.0,
             cams: CamChannel::default(),
             area: own.area,
             module: all.module,
@@ -131,9 +144,16 @@ impl Channel {
     }
 
     #[inline(never)]
+    #[allow(clippy::cast_precision_loss)] // Speeds have 24 bits.
     fn configure(&mut self, all: &Parameters, own: &ChannelParameters, scale: &Scale) {
         let factor = all.speed_factor(self.input.sensor());
-        self.speed_factor = if scale.is_reversed() { -factor } else { factor };
+        let long = all.long_speed_factor(self.input.sensor());
+        let sign = if scale.is_reversed() { -1.0 } else { 1.0 };
+        (self.speed_factor, self.long_factor) = (sign * factor, sign * long);
+        self.share = 1.0 / f32::from(all.long_speed.millis.get());
+        let per_step = scale.units() as f32 / scale.turn().get() as f32;
+        // A delay of 1 is 0.1 ms.
+        self.lead = sign * per_step * f32::from(own.cam_delay) / 10_000.0;
         self.cams.apply(&own.cams, scale.range().get().cast_signed());
         (self.area, self.module) = (own.area, all.module);
         self.commissioning.set(all.operating & super::COMMISSIONING != 0);
@@ -141,7 +161,7 @@ impl Channel {
 
     /// Processes one sample.
     #[inline(never)]
-    pub(super) fn sample(&mut self, raw: &RawEncoder) -> ChannelValues {
+    pub(super) fn sample(&mut self, raw: &RawEncoder, values: &mut ChannelValues) {
         let preset = self.preset.take();
         if preset.is_some() {
             self.input.refer(ALL);
@@ -150,16 +170,24 @@ impl Channel {
         if self.input.has_begun() {
             self.commissioning.observe(self.input.sensor(), &seen);
         }
-        let fixed = ChannelValues {
-            sensor_state: seen.state,
-            commissioning: self.commissioning.progress(),
-            offset: self.position.offset(),
-            presets: self.preset.count,
-            unknown: self.input.unknown(),
-            is_broken: seen.is_broken,
-            ..ChannelValues::default()
+        values.sensor_state = seen.state;
+        values.commissioning = self.commissioning.progress();
+        values.offset = self.position.offset();
+        values.presets = self.preset.count;
+        values.unknown = self.input.unknown();
+        values.is_broken = seen.is_broken;
+        let Some(tracker) = self.input.tracker() else {
+            *values = ChannelValues {
+                position: 0,
+                speed: 0,
+                long_speed: 0,
+                cams: 0,
+                area: 0,
+                reading: 0,
+                ..*values
+            };
+            return;
         };
-        let Some(tracker) = self.input.tracker() else { return fixed };
         if let Some(preset) = preset {
             self.position.preset(preset, tracker.shaft());
         }
@@ -167,14 +195,23 @@ impl Channel {
         let speed = self.speedometer.update(tracker.count());
         // At most 2^32.
         let range = self.position.scale().range().get().cast_signed();
-        ChannelValues {
-            position,
-            speed: speed_value(speed, self.speed_factor),
-            cams: self.cams.update(position),
-            area: area_state(&self.area, &self.module, position, range, self.input.native()),
-            offset: self.position.offset(),
-            reading: self.reading(position),
-            ..fixed
+        values.position = position;
+        values.speed = speed_value(speed, self.speed_factor);
+        self.average += (speed - self.average) * self.share;
+        values.long_speed = rounded(self.average * self.long_factor);
+        values.cams = self.cams.update(self.ahead(position, speed));
+        values.area = area_state(&self.area, &self.module, position, range, self.input.native());
+        values.offset = self.position.offset();
+        values.reading = self.reading(position);
+    }
+
+    /// The position that the cams see: where the shaft will be after their delay.
+    #[inline]
+    fn ahead(&self, position: u32, speed: f32) -> u32 {
+        if self.lead == 0.0 {
+            position
+        } else {
+            self.position.scale().moved(position, rounded(speed * self.lead))
         }
     }
 

@@ -28,7 +28,8 @@
 //!   direction keeps the position, and the offset follows ([`Position::rescale`]).
 //! * 6010h and 6020h are INTEGER32 (v3.1), 6003h and 6004h UNSIGNED32: the same 32 bits. A limit of a cam or of the work
 //!   area below zero is a position at the end of the range.
-//! * Both channels are scaled by the same 6000h to 6002h; 6005h applies to linear encoders.
+//! * Both channels are scaled by the same 6000h to 6002h. 6005h applies to linear encoders, whatever bit 2 of 6000h is:
+//!   without the scaling function, 6002h is replaced by all positions that the sensor distinguishes.
 //! * Cam limits in the wrong order are swapped. A disabled cam reads 0 whatever its polarity. Hysteresis moves the
 //!   points where a cam goes off outwards; for a cam that was off, the limits alone decide ([`Cam`]).
 //! * 6400h bit 0 is set when a limit of 650Ah is reached. A limit at either end of INTEGER32, the default, counts as no
@@ -71,7 +72,7 @@ pub use input::{
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 pub use parameters::{
     AUTOMATIC, CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, HIGHEST_RATE,
-    HIGHEST_SPEED, Parameters, SCALING,
+    HIGHEST_SPEED, LongSpeed, Parameters, SCALING,
 };
 pub use position::Position;
 pub use retained_state::{OperatingTime, PositionRecord, RetainedChannel, RetainedState, Start};
@@ -81,6 +82,7 @@ pub use speed::{STANDSTILL, Speedometer, speed_value};
 pub use ssi::{Coding, Fault, Format, Parity, Reading};
 pub use supervision::{
     ALARM_COMMISSIONING, ALARM_POSITION, Conditions, Limits, SUPPORTED_ALARMS, SUPPORTED_WARNINGS,
-    WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
+    WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_SPEED,
+    WARNING_WATCHDOG,
 };
 pub use tracker::{ShaftPosition, Tracker};

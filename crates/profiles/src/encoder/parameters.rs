@@ -4,7 +4,7 @@ use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::board::PositionInputs;
 
-use super::{Area, Cams, Format, Limits, Module, Native, Scale, Sensor, SensorType, Settings};
+use super::{Area, Cams, Format, Limits, Module, Scale, Sensor, SensorType, Settings};
 
 /// Operating parameter (6000h): the position falls when the shaft turns clockwise. Rotary encoders only.
 pub const CODE_SEQUENCE: u16 = 1 << 0;
@@ -55,6 +55,17 @@ pub struct ChannelParameters {
     pub cams: Cams,
     /// Work area (6401h, 6402h).
     pub area: Area,
+    /// Delay that the cams compensate, in 0.1 ms.
+    pub cam_delay: i16,
+}
+
+/// Settings of the long speed values (2111h).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LongSpeed {
+    /// The unit is 0.01 rpm or um/s, not that of 6030h.
+    pub is_in_own_unit: bool,
+    /// Time constant of the average in milliseconds.
+    pub millis: NonZeroU16,
 }
 
 /// The parameters of the encoder.
@@ -66,6 +77,10 @@ pub struct Parameters {
     pub per_revolution: u32,
     /// Total measuring range (6002h).
     pub range: u32,
+    /// Revolutions of the sensor that have the units of 6001h.
+    pub gear: NonZeroU16,
+    /// Unit and averaging of the long speed values.
+    pub long_speed: LongSpeed,
     /// Position measuring step of a linear encoder in nm (6005h:1).
     pub step: u32,
     /// Speed measuring step of a linear encoder in 0.01 mm/s (6005h:2).
@@ -101,6 +116,7 @@ impl Default for ChannelParameters {
             references: [0; 4],
             cams: Cams::default(),
             area: Area { low: 0, high: i32::MAX },
+            cam_delay: 0,
         }
     }
 }
@@ -114,6 +130,8 @@ impl Default for Parameters {
             operating: 0,
             per_revolution: 4096,
             range: 4096 * 4096,
+            gear: NonZeroU16::MIN,
+            long_speed: LongSpeed { is_in_own_unit: false, millis: NonZeroU16::MIN },
             step: 10_000,
             speed_step: 100,
             travel: None,
@@ -159,12 +177,6 @@ impl Parameters {
         PositionInputs { are_used: true, ssi_bits: is_absolute.then(|| self.format.length()) }
     }
 
-    /// Whether every sensor can give this measuring step (6005h:1).
-    #[must_use]
-    pub fn allow_step(&self, nanometres: u32) -> bool {
-        self.natives().all(|native| native.gives_step(nanometres))
-    }
-
     /// Whether every sensor can give the scaling that the parameters ask for.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
@@ -191,6 +203,16 @@ impl Parameters {
         scale.units() as f32 / scale.turn().get() as f32
     }
 
+    /// Units of the long speed value per native step and second.
+    #[allow(clippy::cast_precision_loss)] // The result has 24 bits.
+    pub(super) fn long_speed_factor(&self, sensor: &Sensor) -> f32 {
+        match self.way(sensor) {
+            _ if !self.long_speed.is_in_own_unit => self.speed_factor(sensor),
+            Some(nanometres) => nanometres / 1000.0,
+            None => 60.0 * 100.0 / sensor.resolution().max(1) as f32,
+        }
+    }
+
     /// Travel per native step in nm; `None` if the sensor measures an angle.
     #[allow(clippy::cast_precision_loss)]
     fn way(&self, sensor: &Sensor) -> Option<f32> {
@@ -213,10 +235,6 @@ impl Parameters {
         self.sensors().fold(0, |bits, sensor| bits | direction_bit(&sensor))
     }
 
-    fn natives(&self) -> impl Iterator<Item = Native> {
-        self.sensors().map(|sensor| sensor.native())
-    }
-
     fn asked_scale(&self, sensor: &Sensor) -> Option<Scale> {
         if let Some(travel) = self.travel {
             return Scale::along(&sensor.native(), travel, NonZeroU32::new(self.step)?);
@@ -227,6 +245,7 @@ impl Parameters {
             per_revolution: self.per_revolution,
             range: self.range,
             step: self.step,
+            gear: self.gear,
         };
         Scale::new(&sensor.native(), &settings)
     }

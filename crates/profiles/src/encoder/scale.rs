@@ -1,6 +1,6 @@
 //! From native steps to measuring units: objects 6000h, 6001h, 6002h, 6005h:1, 6501h and 6502h.
 
-use core::num::{NonZeroU32, NonZeroU64};
+use core::num::{NonZeroU16, NonZeroU32, NonZeroU64};
 
 use super::ShaftPosition;
 use super::fraction::Fraction;
@@ -40,16 +40,6 @@ impl Native {
             Native::Linear { steps, .. } => steps,
         }
     }
-
-    /// Whether the sensor can give this measuring step (6005h:1) in nm: the step is not finer than the sensor's.
-    /// Irrelevant for a shaft.
-    #[must_use]
-    pub fn gives_step(&self, nanometres: u32) -> bool {
-        match *self {
-            Native::Rotary { .. } => nanometres > 0,
-            Native::Linear { step, .. } => nanometres >= step.get(),
-        }
-    }
 }
 
 /// Scaling requested by the user.
@@ -61,9 +51,11 @@ pub struct Settings {
     pub scaling: bool,
     /// Measuring units per revolution (6001h).
     pub per_revolution: u32,
+    /// Revolutions that have the units of 6001h (2114h).
+    pub gear: NonZeroU16,
     /// Total measuring range (6002h).
     pub range: u32,
-    /// Measuring step of a linear encoder in nm (6005h:1).
+    /// Measuring step of a linear encoder in nm (6005h:1), with and without the scaling function.
     pub step: u32,
 }
 
@@ -84,14 +76,23 @@ impl Scale {
     /// The scale of these settings; `None` if the sensor cannot give them (0609 0030h).
     #[must_use]
     pub fn new(native: &Native, settings: &Settings) -> Option<Scale> {
-        if !settings.scaling {
-            return Some(Scale::unscaled(native, settings.reversed));
-        }
-        let gives = settings.per_revolution > 0 && native.gives_step(settings.step);
-        let range = NonZeroU64::new(settings.range.into()).filter(|_| gives)?;
         let (units, turn) = match *native {
-            Native::Rotary { per_revolution, .. } => (settings.per_revolution, per_revolution),
+            Native::Rotary { .. } if !settings.scaling => {
+                return Some(Scale::unscaled(native, settings.reversed));
+            }
+            Native::Rotary { per_revolution, .. } if settings.gear == NonZeroU16::MIN => {
+                (settings.per_revolution, per_revolution)
+            }
+            Native::Rotary { per_revolution, .. } => {
+                let turns = NonZeroU64::from(per_revolution).saturating_mul(settings.gear.into());
+                way(NonZeroU32::new(settings.per_revolution)?.into(), turns)?
+            }
             Native::Linear { step, .. } => way(step.into(), NonZeroU32::new(settings.step)?.into())?,
+        };
+        let range = if settings.scaling {
+            NonZeroU64::new(settings.range.into()).filter(|_| units > 0)?
+        } else {
+            whole(native, units, turn).unwrap_or(NonZeroU64::MIN)
         };
         Some(Scale::build(units, turn, range, settings.reversed))
     }
@@ -109,9 +110,7 @@ impl Scale {
         let unit = NonZeroU64::from(steps).saturating_mul(step.into());
         let (units, turn) =
             way(NonZeroU64::new(nanometres)?, unit).filter(|(units, turn)| *units <= turn.get())?;
-        // A product that saturates is longer than any range: a turn has less than 2^32 steps.
-        let range = native.steps().get().saturating_mul(units.into()) / NonZeroU64::from(turn);
-        Some(Scale::build(units, turn, NonZeroU64::new(range)?.min(MOST), false))
+        Some(Scale::build(units, turn, whole(native, units, turn)?, false))
     }
 
     /// The scale in the sensor's own steps.
@@ -158,6 +157,11 @@ impl Scale {
         // A turn and a range have at most 2^32 steps each, so their product fits 64 bits.
         let range = NonZeroU64::from(self.turn).saturating_mul(self.range);
         steps.saturating_mul(self.units.into()) % range == 0
+    }
+
+    /// Whether the range is that of a code of so many native steps, to one unit.
+    pub(super) fn covers(&self, steps: u64) -> bool {
+        steps.saturating_mul(self.units.into()) / NonZeroU64::from(self.turn) == self.range.get()
     }
 
     /// Whether both scales count in the same units.
@@ -209,6 +213,13 @@ impl Scale {
         low_word(if a >= b { a - b } else { a + self.range.get() - b })
     }
 
+    /// The position so many units further.
+    #[must_use]
+    #[inline(never)]
+    pub(super) fn moved(&self, position: u32, units: i32) -> u32 {
+        self.add(position, low_word(self.modulo(units.into())))
+    }
+
     /// The position value, computed with two divisions; [`Position`](super::Position) computes it faster for every
     /// sample.
     #[must_use]
@@ -244,8 +255,15 @@ fn way(step: NonZeroU64, unit: NonZeroU64) -> Option<(u32, NonZeroU32)> {
     let common = common_divisor(step, unit);
     let units = u32::try_from(step.get() / common).ok()?;
     let turn = NonZeroU32::new(u32::try_from(unit.get() / common).ok()?)?;
-    let times = (LONG_TURN.get() / turn).max(1);
+    let times = (LONG_TURN.get() / turn).min(u32::MAX.checked_div(units)?).max(1);
     Some((units.saturating_mul(times), turn.saturating_mul(NonZeroU32::new(times)?)))
+}
+
+/// All positions that a sensor distinguishes, in units.
+fn whole(native: &Native, units: u32, turn: NonZeroU32) -> Option<NonZeroU64> {
+    // A product that saturates is longer than any range: a turn has less than 2^32 steps.
+    let range = native.steps().get().saturating_mul(units.into()) / NonZeroU64::from(turn);
+    NonZeroU64::new(range).map(|range| range.min(MOST))
 }
 
 fn common_divisor(a: NonZeroU64, b: NonZeroU64) -> NonZeroU64 {

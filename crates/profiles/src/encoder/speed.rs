@@ -120,10 +120,15 @@ impl Speedometer {
 
 /// Converts steps per second to the value of 6030h: in units, rounded to the nearest, saturated to INTEGER16.
 #[must_use]
-#[allow(clippy::cast_possible_truncation)] // `as` saturates.
+#[allow(clippy::cast_possible_truncation)] // The value is in the range.
 pub fn speed_value(per_second: f32, units_per_step: f32) -> i16 {
-    let value = per_second * units_per_step;
-    (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i16
+    rounded(per_second * units_per_step).clamp(i16::MIN.into(), i16::MAX.into()) as i16
+}
+
+/// The nearest whole number, saturated to INTEGER32.
+#[allow(clippy::cast_possible_truncation)] // `as` saturates.
+pub(super) fn rounded(value: f32) -> i32 {
+    (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i32
 }
 
 #[cfg(test)]

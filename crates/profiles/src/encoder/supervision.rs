@@ -21,10 +21,12 @@ pub const WARNING_OPERATING_TIME: u16 = 1 << 3;
 pub const WARNING_BATTERY: u16 = 1 << 4;
 /// Warning bit 5: reference point not reached.
 pub const WARNING_REFERENCE: u16 = 1 << 5;
+/// Warning bit 12 (manufacturer): a speed value (6030h) is at a limit of INTEGER16.
+pub const WARNING_SPEED: u16 = 1 << 12;
 /// Supported warnings (6506h), apart from the battery (bit 4), which is supported on boards that measure it. The light
 /// reserve (bit 1) is never supported: neither kind of input shows it.
 pub const SUPPORTED_WARNINGS: u16 =
-    WARNING_FREQUENCY | WARNING_WATCHDOG | WARNING_OPERATING_TIME | WARNING_REFERENCE;
+    WARNING_FREQUENCY | WARNING_WATCHDOG | WARNING_OPERATING_TIME | WARNING_REFERENCE | WARNING_SPEED;
 
 /// Supported warnings (6506h) on this board.
 pub(super) fn supported_warnings(board: &Board) -> u16 {
@@ -165,6 +167,7 @@ impl Supervision {
             | flag(self.is_too_old(limits, time), WARNING_OPERATING_TIME)
             | flag(self.battery.update(battery), WARNING_BATTERY)
             | flag(sensors & SENSOR_UNREFERENCED != 0, WARNING_REFERENCE)
+            | flag(channels.iter().any(|channel| matches!(channel.speed, i16::MIN | i16::MAX)), WARNING_SPEED)
     }
 
     pub(super) fn conditions(

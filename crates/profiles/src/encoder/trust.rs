@@ -41,6 +41,8 @@ impl Basis {
             SensorType::IncrementalCounted | SensorType::LinearIncrementalCounted => Basis::Count,
             // The code has a whole number of ranges.
             _ if scale.repeats_after(1 << sensor.bits().min(32)) => Basis::Code,
+            // A linear encoder does not leave its code: a rest of less than a unit at its end does not matter.
+            SensorType::LinearAbsolute if scale.covers(1 << sensor.bits().min(32)) => Basis::Code,
             SensorType::LinearAbsolute => Basis::LongCode,
             SensorType::MultiTurn if sensor.format.revolution_bits() >= LONG => Basis::LongCode,
             _ => Basis::ShortCode,

@@ -25,6 +25,9 @@ pub const UNITS: usize = 4;
 /// Operating parameter (6380h): the position falls when the sensor counts up.
 pub const INVERTED: u16 = 1 << 3;
 
+/// The bits of the state that are the area state (63B0h to 63B3h): those of 6400h of CiA 406.
+pub const AREA: u8 = encoder::OUT_OF_RANGE | encoder::OVERFLOW | encoder::UNDERFLOW;
+
 /// State of a position unit: the sensor gives no position.
 pub const UNKNOWN: u8 = 1 << 3;
 
@@ -69,7 +72,7 @@ pub struct UnitParameters {
     pub operating: u16,
     /// Difference between position and travel, in measuring steps.
     pub offset: i32,
-    /// Limits of the position (63B4h, 63B8h), compared like the work area of CiA 406.
+    /// Limits of the position (63B4h to 63BBh), compared like the work area of CiA 406.
     pub limits: Area,
     /// Number of presets (2306h); 0 before the first one, [`NO_OFFSET`] when the offset has lost its meaning since.
     pub references: u8,
@@ -211,7 +214,7 @@ pub struct UnitValues {
     /// Resolution (63C1h) of the sensor: steps per revolution, or nm a step.
     pub resolution: u32,
     /// Revolutions (63C2h) that the sensor distinguishes.
-    pub revolutions: u32,
+    pub revolutions: u16,
     /// Warnings (63C5h), the same as in CiA 406. They concern both sensors together.
     pub warnings: u16,
 }
@@ -251,7 +254,7 @@ impl Unit {
             offset: own.offset,
             operating_status: operating_status(is_inverted),
             resolution: sensor.resolution(),
-            revolutions: sensor.revolutions().into(),
+            revolutions: sensor.revolutions(),
             ..UnitValues::default()
         };
         let (source, range) = (own.source?, all.range(number)?);

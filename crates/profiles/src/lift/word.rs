@@ -34,9 +34,7 @@ impl Word {
         self.0[1]
     }
 
-    /// The lifts that the word concerns.
-    #[must_use]
-    pub const fn lifts(self) -> u8 {
+    const fn lifts(self) -> u8 {
         self.0[2]
     }
 
@@ -108,6 +106,20 @@ impl Word {
     fn shares_door(self, other: Word) -> bool {
         let relevant = if matches!(self.function(), 0x05..=0x0D) { SOURCE_DOORS } else { ANY };
         self.doors() == ANY || other.doors() == ANY || self.doors() & other.doors() & relevant != 0
+    }
+
+    /// The doors of the lifts that the lamp with this word and `output` share: four bits for each lift.
+    #[must_use]
+    #[inline(never)]
+    pub fn places(self, output: Word) -> u32 {
+        let doors = match (self.doors(), output.doors()) {
+            (ANY, doors) | (doors, ANY) => doors & SOURCE_DOORS,
+            (own, others) => own & others & SOURCE_DOORS,
+        };
+        // Without a common door of this side, the lamp as a whole is one place.
+        let doors = u32::from(if doors == 0 { SOURCE_DOORS } else { doors });
+        let lifts = self.lifts() & output.lifts();
+        (0..8).filter(|lift| lifts >> lift & 1 != 0).fold(0, |places, lift| places | doors << (4 * lift))
     }
 
     /// The light that an output asks for.

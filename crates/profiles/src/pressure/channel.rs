@@ -44,6 +44,8 @@ pub struct ChannelParameters {
     pub unit: Unit,
     /// 6124h, added to the process value in its unit.
     pub offset: f32,
+    /// 2210h, subtracted from the process value.
+    pub tare: f32,
     /// 6132h, decimal digits of the integer formats.
     pub digits: u8,
     /// Span of the REAL32 process value.
@@ -65,6 +67,7 @@ impl ChannelParameters {
             scaling_offset: 0.0,
             unit,
             offset: 0.0,
+            tare: 0.0,
             digits: 0,
             span,
             span16: Span { start: i16::MIN, end: i16::MAX },
@@ -86,8 +89,9 @@ pub struct ChannelValues {
     pub process_value32: i32,
     /// 6150h, status.
     pub status: u8,
-    /// The value comes from an intact sensor, whether or not every format can show it.
-    pub is_measured: bool,
+    /// The process value without its offset, if it comes from an intact sensor and fits a REAL32, whether or not the
+    /// integer formats can show it.
+    pub measured: Option<f32>,
 }
 
 /// A channel: its parameters and the state of its filter.
@@ -128,7 +132,8 @@ impl Channel {
         let valid = valid && field_value.is_finite();
         let field_value = finite(field_value);
         let scaled = self.filter.next(field_value) * p.scaling_factor + p.scaling_offset;
-        let process_value = finite(p.unit.of(scaled) + p.offset);
+        let in_unit = p.unit.of(scaled);
+        let process_value = finite(in_unit + p.offset - p.tare);
         // In single precision on purpose: the nearest single to 0.29 times 100 is 29, while the same product in double
         // precision is 28.999999 and would be cut to 28.
         let shifted = process_value * self.shift;
@@ -143,7 +148,7 @@ impl Channel {
             process_value16,
             process_value32,
             status,
-            is_measured: valid,
+            measured: Some(in_unit).filter(|value| valid && value.is_finite()),
         }
     }
 }
@@ -210,7 +215,7 @@ mod tests {
             process_value16: 275,
             process_value32: 275,
             status: 0,
-            is_measured: true,
+            measured: Some(2.5),
         };
         assert_eq!(sample(&bar, 100_000.0), expected);
     }

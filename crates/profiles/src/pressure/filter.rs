@@ -3,13 +3,14 @@
 //! The state has twice the digits of single precision ([`Precise`]). With a constant of 255, single precision would
 //! drop increments below 255 units of the last place, and the output would stop short of its target.
 
-use super::precise::Precise;
+use super::precise::{Divisor, Precise};
 
 /// The filter of one channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
     kind: Kind,
     constant: u8,
+    divisor: Divisor,
     /// Last output; `None` until the first input.
     output: Option<Precise>,
     /// Sum of the inputs in the present block, for the repeating average.
@@ -34,7 +35,8 @@ impl Filter {
             2 => Kind::RepeatingAverage,
             _ => Kind::None,
         };
-        Filter { kind, constant: constant.max(1), output: None, sum: Precise::ZERO, count: 0 }
+        let constant = constant.max(1);
+        Filter { kind, constant, divisor: Divisor::new(constant), output: None, sum: Precise::ZERO, count: 0 }
     }
 
     /// Whether both filters have the same parameters, whatever their states.
@@ -69,7 +71,7 @@ impl Filter {
 
     fn moving_average(&mut self, input: Precise) -> Precise {
         let last = self.output.unwrap_or(input);
-        *self.output.insert(last.plus(input.minus(last).over(self.constant)))
+        *self.output.insert(last.plus(input.minus(last).over(self.divisor)))
     }
 
     /// Gives a new output at the end of every block; the output stays constant in between.
@@ -79,7 +81,7 @@ impl Filter {
         if self.count < self.constant {
             return *self.output.get_or_insert(input);
         }
-        let average = self.sum.over(self.constant);
+        let average = self.sum.over(self.divisor);
         (self.sum, self.count) = (Precise::ZERO, 0);
         *self.output.insert(average)
     }

@@ -9,6 +9,22 @@
 /// The largest number that is accepted: neither a sum of 255 such numbers nor the difference of two overflows.
 pub(super) const LARGEST: f32 = f32::MAX / 512.0;
 
+/// A whole number to divide by, and its reciprocal: a division takes 14 cycles, a product one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Divisor {
+    number: f32,
+    reciprocal: f32,
+}
+
+impl Divisor {
+    /// The number must not be 0.
+    pub(super) const fn new(number: u8) -> Divisor {
+        Divisor { number: number as f32, reciprocal: 1.0 / number as f32 }
+    }
+}
+
+const TEN: Divisor = Divisor::new(10);
+
 /// A number: the nearest number of single precision, and the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Precise {
@@ -51,18 +67,17 @@ impl Precise {
     pub(super) fn shifted(self, digits: i8) -> Precise {
         let times = |value: Precise, factor| Precise { high: value.high * factor, low: value.low * factor };
         (0..digits.unsigned_abs()).fold(self, |value, _| {
-            if digits > 0 { times(value, 8.0).plus(times(value, 2.0)) } else { value.over(10) }
+            if digits > 0 { times(value, 8.0).plus(times(value, 2.0)) } else { value.over(TEN) }
         })
     }
 
-    /// Divided by a whole number, which must not be 0.
-    pub(super) fn over(self, divisor: u8) -> Precise {
-        let divisor = f32::from(divisor);
-        let quotient = self.high / divisor;
+    /// Divided by a whole number.
+    pub(super) fn over(self, Divisor { number: divisor, reciprocal }: Divisor) -> Precise {
+        let quotient = self.high * reciprocal;
         // The upper 16 bits and the lower 8 bits of the quotient: their products with 8 bits are exact.
         let upper = f32::from_bits(quotient.to_bits() & 0xFFFF_FF00);
         let remainder = self.high - upper * divisor - (quotient - upper) * divisor;
-        Precise::near(quotient, (remainder + self.low) / divisor)
+        Precise::near(quotient, (remainder + self.low) * reciprocal)
     }
 
     /// The sum of a number and a much smaller one.

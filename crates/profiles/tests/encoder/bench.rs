@@ -20,15 +20,14 @@ pub(crate) struct Bench {
 
 /// Parameters for the leaps of the bench, which are faster than any encoder: 2104h is set accordingly.
 pub(crate) fn one(kind: SensorType) -> Parameters {
-    let mut parameters = Parameters::default();
+    let mut parameters = delivered(kind);
     parameters.channels.iter_mut().for_each(|channel| channel.fastest = 10_000);
-    parameters.channels[0].kind = Some(kind);
     parameters
 }
 
-/// The parameters as delivered, with this sensor type.
+/// The parameters as delivered, with this sensor type. A linear encoder counts in its own steps of 4096 nm.
 pub(crate) fn delivered(kind: SensorType) -> Parameters {
-    let mut parameters = Parameters::default();
+    let mut parameters = Parameters { step: 4096, ..Parameters::default() };
     parameters.channels[0].kind = Some(kind);
     parameters
 }

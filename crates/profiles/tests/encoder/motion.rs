@@ -1,8 +1,8 @@
 //! Position and speed of a moving rotary or linear encoder.
 
 use profiles::encoder::{
-    CODE_SEQUENCE, Cam, Cams, DIRECTION, SCALING, SENSOR_INDEX, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED,
-    SensorType,
+    CODE_SEQUENCE, Cam, Cams, DIRECTION, LongSpeed, SCALING, SENSOR_INDEX, SENSOR_POSITION_ERROR,
+    SENSOR_UNREFERENCED, SensorType, WARNING_SPEED,
 };
 
 use crate::bench::{Bench, one, two};
@@ -165,5 +165,55 @@ fn an_index_that_is_lost_is_noticed_every_time() {
         assert_eq!(snapshot.channels[0].sensor_state, SENSOR_INDEX | SENSOR_POSITION_ERROR);
         assert!(snapshot.alarms == 1 && snapshot.conditions.position);
         (0..15).for_each(|_| _ = without_index(&mut bench, -800));
+    }
+}
+
+/// 4096 steps a revolution at 6000 rpm: 409,600 steps a second, which INTEGER16 cannot hold.
+#[test]
+fn a_long_speed_value_has_its_unit_and_its_average_and_the_short_one_says_that_it_is_at_its_limit() {
+    for (is_in_own_unit, millis, fastest, after) in
+        [(false, 1, 409_600, 409_600), (true, 1, 600_000, 600_000), (true, 100, 600_000, 379_000)]
+    {
+        let mut parameters = one(SensorType::IncrementalCounted);
+        parameters.long_speed = LongSpeed { is_in_own_unit, millis: millis.try_into().unwrap() };
+        let mut bench = Bench::new(parameters);
+        let at = |millis: i64| millis * 4096 / 10;
+        let early = (1..=100).map(|millis| bench.go(at(millis))).last().unwrap();
+        let near = |value: i32, expected: i32| (value - expected).abs() < expected / 50;
+        assert!(near(early.channels[0].long_speed, after), "{}", early.channels[0].long_speed);
+        let settled = (101..=1200).map(|millis| bench.go(at(millis))).last().unwrap();
+        assert!(near(settled.channels[0].long_speed, fastest), "{}", settled.channels[0].long_speed);
+        assert_eq!((settled.channels[0].speed, settled.warnings & WARNING_SPEED), (i16::MAX, WARNING_SPEED));
+        (0..1100).for_each(|_| _ = bench.stay());
+        let rest = bench.stay();
+        assert_eq!((rest.channels[0].speed, rest.warnings & WARNING_SPEED), (0, 0));
+    }
+}
+
+/// A cam from 1050 to 2050, at 100 steps a millisecond and a delay of 5 ms: it switches 500 steps earlier, both ways
+/// and across zero.
+#[test]
+fn cams_compensate_their_delay() {
+    for (low, high, start, step, on) in [
+        (1050, 2050, 0, 100, 550..=1550),
+        (1050, 2050, 3000, -100, 1550..=2550),
+        (150, 350, -3000, 100, -350..=-150),
+    ] {
+        let mut parameters = one(SensorType::IncrementalCounted);
+        let cam = Cam { low, high, hysteresis: 0 };
+        let own = &mut parameters.channels[0];
+        own.cams = Cams { cams: [cam; 8], enable: 1, polarity: 0 };
+        own.cam_delay = 50;
+        parameters.index = false;
+        let mut bench = Bench::new(parameters);
+        bench.stay();
+        bench.go(start - 20 * step);
+        for millis in -19..30 {
+            let at = start + millis * step;
+            let cams = bench.go(at).channels[0].cams;
+            // The speed is known after a few changes.
+            assert!(millis < 0 || cams == u8::from(on.contains(&at)), "{low}: {cams} at {at}");
+        }
+        bench.rest();
     }
 }

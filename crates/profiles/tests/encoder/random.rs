@@ -5,11 +5,12 @@ use profiles::profile::Chain;
 use std::num::{NonZeroU16, NonZeroU32};
 
 use profiles::encoder::{
-    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Limits, Module, Parameters, Parity,
-    PositionRecord, RetainedState, SensorType, Start,
+    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Limits, LongSpeed, Module,
+    Parameters, Parity, PositionRecord, RetainedState, SensorType, Start,
 };
 use proptest::prelude::*;
 
+#[allow(clippy::cast_possible_truncation)]
 fn any_channel() -> impl Strategy<Value = ChannelParameters> {
     let cam = any::<(i32, i32, u16)>().prop_map(|(low, high, hysteresis)| Cam { low, high, hysteresis });
     let cams = (prop::array::uniform8(cam), any::<(u8, u8)>());
@@ -24,6 +25,7 @@ fn any_channel() -> impl Strategy<Value = ChannelParameters> {
                 preset: Command { value, count },
                 cams: Cams { cams, enable, polarity },
                 area: Area { low, high },
+                cam_delay: low as i16,
                 offset: low,
                 users: 1,
                 references: [count; 4],
@@ -57,6 +59,11 @@ fn any_parameters() -> impl Strategy<Value = Parameters> {
             Parameters {
                 operating,
                 per_revolution,
+                gear: NonZeroU16::new(highest_current).unwrap_or(NonZeroU16::MIN),
+                long_speed: LongSpeed {
+                    is_in_own_unit: index,
+                    millis: NonZeroU16::new(lowest_battery).unwrap_or(NonZeroU16::MIN),
+                },
                 range,
                 step,
                 speed_step,

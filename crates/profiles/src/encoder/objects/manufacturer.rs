@@ -1,4 +1,4 @@
-//! Manufacturer-specific objects of the encoder, 2100h to 210Ch: description of the sensors, and functions that CiA 406
+//! Manufacturer-specific objects of the encoder, 2100h to 2115h: description of the sensors, and functions that CiA 406
 //! leaves open.
 
 use crate::encoder::AUTOMATIC;
@@ -36,6 +36,10 @@ const fn module(sub: u8, name: &'static str, default: i64) -> Object {
 
 const fn state(index: u16, sub: u8, name: &'static str) -> Object {
     Object::new(index, sub, name, Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo)
+}
+
+const fn speed(sub: u8, name: &'static str) -> Object {
+    Object::new(0x2110, sub, name, Type::Integer32, Access::ReadOnly).mappable(Mapping::Tpdo).unit("2111h:1")
 }
 
 const fn commands(sub: u8, name: &'static str) -> Object {
@@ -95,4 +99,28 @@ pub(crate) const SENSORS: &[Object] = &[
     Object::highest(0x210C, 2, "Commissioning diagnostic"),
     state(0x210C, 1, "Commissioning diagnostic channel 1"),
     state(0x210C, 2, "Commissioning diagnostic channel 2"),
+    Object::highest(0x2110, 2, "Long speed values"),
+    speed(1, "Long speed value channel 1"),
+    speed(2, "Long speed value channel 2"),
+    Object::highest(0x2111, 2, "Long speed settings"),
+    // 0: the unit of 6030h; 1: 0.01 rpm of a shaft, um/s of a linear encoder.
+    parameter(0x2111, 1, "Unit of long speed values", Type::Unsigned8).limits(0, 1),
+    parameter(0x2111, 2, "Averaging of long speed values", Type::Unsigned16)
+        .limits(1, 1000)
+        .value(1)
+        .unit("ms"),
+    // A TPDO of type 255 is sent when the position has moved by so much; 0: with each change.
+    Object::highest(0x2112, 2, "Change thresholds of positions"),
+    parameter(0x2112, 1, "Change threshold channel 1", Type::Unsigned32).unit("units"),
+    parameter(0x2112, 2, "Change threshold channel 2", Type::Unsigned32).unit("units"),
+    // The cams see the position of so much later; negative: of so much earlier.
+    Object::highest(0x2113, 2, "Cam delay compensations"),
+    parameter(0x2113, 1, "Cam delay compensation channel 1", Type::Integer16).unit("0.1 ms"),
+    parameter(0x2113, 2, "Cam delay compensation channel 2", Type::Integer16).unit("0.1 ms"),
+    // 6001h units are so many revolutions of the sensor.
+    sensor(0x2114, 0, "Gear factor", Type::Unsigned16).limits(1, 0xFFFF).value(1),
+    // The digital input that makes a preset; 0: none.
+    Object::highest(0x2115, 2, "Preset inputs"),
+    parameter(0x2115, 1, "Preset input channel 1", Type::Unsigned8).limits(0, 2),
+    parameter(0x2115, 2, "Preset input channel 2", Type::Unsigned8).limits(0, 2),
 ];

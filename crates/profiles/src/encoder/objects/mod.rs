@@ -16,10 +16,11 @@ pub(crate) use manufacturer::SENSORS;
 pub(crate) use pdos::{BY_EVENT, BY_SYNC};
 pub(crate) use sensors::Sensors;
 pub use values::Fields;
+use values::Reports;
 pub(crate) use values::device_type;
 
-use canopen::dictionary::{self, Dictionary, Entry, Object};
-use canopen::sdo::Abort;
+use canopen::dictionary::{self, Dictionary, Entry, Group, Groups, Object};
+use canopen::sdo::{Abort, Multiplexer};
 
 use super::{Encoder, Parameters, Snapshot};
 use crate::communication::{self, RPDOS, device_name, error_behaviour, tpdo_mappings, tpdos};
@@ -61,6 +62,7 @@ pub const fn handles(index: u16, sub: u8) -> bool {
 #[derive(Debug)]
 pub struct Objects {
     fields: &'static Fields,
+    reports: [Reports; 2],
 }
 
 impl Profile for Objects {
@@ -68,11 +70,11 @@ impl Profile for Objects {
     type Fields = Fields;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields }
+        Objects { fields, reports: [Reports::default(); 2] }
     }
 
-    fn initialise(&mut self, image: &mut [u8], is_stored: bool) {
-        self.fields.initialise(image, is_stored);
+    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
+        self.fields.initialise(image, stored.contains(Group::Communication));
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {
@@ -81,6 +83,19 @@ impl Profile for Objects {
 
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
         self.fields.publish(snapshot, image);
+        for (channel, reports) in self.fields.channels.iter().zip(&mut self.reports) {
+            channel.report(snapshot.digital, reports, image);
+        }
+    }
+
+    fn is_quiet(&self, place: usize) -> bool {
+        self.fields.is_quiet(&self.reports, place)
+    }
+
+    fn take_preset(&mut self, _: &[u8]) -> Option<Multiplexer> {
+        let (sub, reports) = (1..).zip(&mut self.reports).find(|(_, reports)| reports.has_preset)?;
+        reports.has_preset = false;
+        Some(Multiplexer { index: 0x6010, sub })
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {

@@ -12,13 +12,12 @@ use canopen::sdo::Abort;
 pub(super) enum Rule {
     /// 6000h: reserved bits, and direction bits that apply to no sensor, are refused.
     Operating,
-    /// 6001h and 6002h: all of UNSIGNED32 (CiA 406, 7.2.2 and 7.2.3) but 0, because a turn or range of 0 is impossible.
+    /// 6001h, 6002h and 6005h:1: all of UNSIGNED32 (CiA 406, 7.2.2, 7.2.3, 7.2.6) but 0, because a turn, a range or a step
+    /// of 0 is impossible.
     Range,
     /// 6003h and 6010h: the position becomes the preset.
     Preset,
-    /// 6005h:1: at least as coarse as the sensors resolve.
-    Step,
-    /// 2100h to 2103h: description of a sensor.
+    /// 2100h to 2103h, 2114h: description of a sensor and its gear.
     Sensor,
     /// 2107h: locked by 2108h.
     Factory,
@@ -30,13 +29,12 @@ impl Rule {
     /// The rule of an object.
     pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
         Some(match (index, sub) {
-            (0x2100..=0x2103, 1..) => Rule::Sensor,
+            (0x2100..=0x2103, 1..) | (0x2114, 0) => Rule::Sensor,
             (0x2107, 1..) => Rule::Factory,
             (0x2109, 0) => Rule::Acknowledge,
             (0x6000, 0) => Rule::Operating,
-            (0x6001 | 0x6002, 0) => Rule::Range,
+            (0x6001 | 0x6002, 0) | (0x6005, 1) => Rule::Range,
             (0x6003, 0) | (0x6010, 1..) => Rule::Preset,
-            (0x6005, 1) => Rule::Step,
             _ => return None,
         })
     }
@@ -55,7 +53,6 @@ impl Fields {
         match rule {
             Rule::Operating => allow(is_operating(&self.parameters(image), value)),
             Rule::Range => allow(value > 0),
-            Rule::Step => allow(self.parameters(image).allow_step(value)),
             Rule::Preset => self.preset(entry, value, image),
             Rule::Sensor => self.describe_sensor(entry, bytes, image),
             Rule::Factory if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::DeviceState),

@@ -1,10 +1,12 @@
 //! Transfer of measured values into the image, and of parameters out of the image.
 
 use super::Sensors;
+use crate::board::DIGITAL_INPUTS;
 use crate::encoder::{
-    Area, Cam, Cams, ChannelParameters, ChannelValues, Command, Module, Parameters, Snapshot,
+    Area, Cam, Cams, ChannelParameters, ChannelValues, Command, LongSpeed, Module, Parameters, Snapshot,
 };
 use canopen::dictionary::{Dictionary, Field};
+use core::num::NonZeroU16;
 
 /// 6004h and 6020h:1 as PDO mapping entries.
 pub(super) const POSITION: u32 = 0x6004_0020;
@@ -40,6 +42,8 @@ pub struct Fields {
     range: Field,
     step: Field,
     speed_step: Field,
+    gear: Field,
+    long_speed: [Field; 2],
     module: [Field; 3],
     identification: [Field; 3],
     operating_status: Field,
@@ -60,6 +64,10 @@ pub(super) struct Channel {
     pub(super) position: Field,
     pub(super) sensor_state: Field,
     speed: Field,
+    long_speed: Field,
+    threshold: Field,
+    cam_delay: Field,
+    preset_input: Field,
     cam_state: Field,
     cam_enable: Field,
     cam_polarity: Field,
@@ -98,6 +106,10 @@ impl Channel {
             position: d.field(0x6020, sub),
             sensor_state: d.field(0x210B, sub),
             speed: d.field(0x6030, sub),
+            long_speed: d.field(0x2110, sub),
+            threshold: d.field(0x2112, sub),
+            cam_delay: d.field(0x2113, sub),
+            preset_input: d.field(0x2115, sub),
             cam_state: d.field(0x6300, sub),
             cam_enable: d.field(0x6301, sub),
             cam_polarity: d.field(0x6302, sub),
@@ -120,6 +132,7 @@ impl Channel {
 
     fn publish(&self, values: &ChannelValues, image: &mut [u8]) {
         self.speed.store(image, values.speed.to_le_bytes());
+        self.long_speed.store(image, values.long_speed.to_le_bytes());
         self.sensor_state.store(image, [values.sensor_state]);
         self.commissioning.store(image, [values.commissioning.code()]);
         // A sample from before the last preset must not restore the old position.
@@ -141,13 +154,53 @@ impl Channel {
                 polarity: self.cam_polarity.u8(image),
             },
             area: Area { low, high },
+            cam_delay: i16::from_le_bytes(self.cam_delay.load(image)),
             offset: i32::from_le_bytes(self.offset.load(image)),
             ..sensor
         }
     }
 }
 
+/// What a channel has done since the last sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reports {
+    /// The position that was last worth a TPDO of type 255.
+    position: u32,
+    /// The position is less than the threshold (2112h) away from it.
+    is_quiet: bool,
+    /// The preset input was off.
+    was_off: bool,
+    /// The preset input has gone on.
+    pub(super) has_preset: bool,
+}
+
+impl Channel {
+    /// Takes the values of a millisecond.
+    pub(super) fn report(&self, digital: [bool; DIGITAL_INPUTS], reports: &mut Reports, image: &[u8]) {
+        let position = self.position.u32(image);
+        let threshold = self.threshold.u32(image);
+        reports.is_quiet = position.abs_diff(reports.position) < threshold;
+        if !reports.is_quiet {
+            reports.position = position;
+        }
+        let input = usize::from(self.preset_input.u8(image));
+        let is_on = input.checked_sub(1).and_then(|input| digital.get(input)).is_none_or(|is_on| *is_on);
+        reports.has_preset |= is_on && reports.was_off && input > 0;
+        reports.was_off = !is_on;
+    }
+}
+
 impl Fields {
+    /// Whether the value at this place belongs to a position that has hardly moved.
+    pub(super) fn is_quiet(&self, reports: &[Reports; 2], place: usize) -> bool {
+        let [first, _] = reports;
+        first.is_quiet && self.position.is_at(place)
+            || self.channels.iter().zip(reports).any(|(channel, reports)| {
+                let fields = [channel.position, channel.speed, channel.long_speed];
+                reports.is_quiet && fields.iter().any(|field| field.is_at(place))
+            })
+    }
+
     /// Looks the fields up during compilation. `device_type` is the index of the device type: 1000h or 67FFh.
     pub(crate) const fn new(d: &Dictionary, device_type: u16) -> Fields {
         Fields {
@@ -166,6 +219,8 @@ impl Fields {
             range: d.field(0x6002, 0),
             step: d.field(0x6005, 1),
             speed_step: d.field(0x6005, 2),
+            gear: d.field(0x2114, 0),
+            long_speed: [d.field(0x2111, 1), d.field(0x2111, 2)],
             module: [d.field(0x2107, 1), d.field(0x2107, 2), d.field(0x2107, 3)],
             identification: [d.field(0x650A, 1), d.field(0x650A, 2), d.field(0x650A, 3)],
             operating_status: d.field(0x6500, 0),
@@ -225,11 +280,17 @@ impl Fields {
         let [offset, low, high] = self.module.map(|at| i32::from_le_bytes(at.load(image)));
         let mask = self.acknowledgement.u16(image).into();
         let sensors = self.sensors.parameters(image);
+        let [unit, millis] = &self.long_speed;
         let ([first, second], [a, b]) = (&self.channels, sensors.channels);
         Parameters {
             operating: self.operating.u16(image),
             per_revolution: self.per_revolution.u32(image),
             range: self.range.u32(image),
+            gear: NonZeroU16::new(self.gear.u16(image)).unwrap_or(NonZeroU16::MIN),
+            long_speed: LongSpeed {
+                is_in_own_unit: unit.u8(image) != 0,
+                millis: NonZeroU16::new(millis.u16(image)).unwrap_or(NonZeroU16::MIN),
+            },
             step: self.step.u32(image),
             speed_step: self.speed_step.u32(image),
             channels: [first.parameters(a, image), second.parameters(b, image)],

@@ -21,20 +21,16 @@ fn linear(step: u32) -> Native {
 }
 
 fn scaled(per_revolution: u32, range: u32) -> Settings {
-    Settings { reversed: false, scaling: true, per_revolution, range, step: 1 }
+    Settings { reversed: false, scaling: true, per_revolution, gear: NonZeroU16::MIN, range, step: 1 }
 }
 
 fn any_settings() -> impl Strategy<Value = (Native, Settings)> {
     let shaft = (1..u32::MAX, 1..=65_536_u32).prop_map(|(steps, revolutions)| rotary(steps, revolutions));
     let rod = (1..u32::MAX).prop_map(linear);
     prop_oneof![3 => shaft, 1 => rod].prop_flat_map(|native| {
-        let (units, steps) = match native {
-            Native::Rotary { .. } => (1..=u32::MAX, 1..=u32::MAX),
-            Native::Linear { step, .. } => (1..=u32::MAX, step.get()..=u32::MAX),
-        };
-        (units, steps, 1..=u32::MAX, any::<bool>(), any::<bool>()).prop_map(
+        (1..=u32::MAX, 1..=u32::MAX, 1..=u32::MAX, any::<bool>(), any::<bool>()).prop_map(
             move |(per_revolution, step, range, reversed, scaling)| {
-                (native, Settings { reversed, scaling, per_revolution, range, step })
+                (native, Settings { reversed, scaling, per_revolution, gear: NonZeroU16::MIN, range, step })
             },
         )
     })
@@ -52,7 +48,7 @@ pub(in crate::encoder) fn shaft_at(total: i64, scale: &Scale) -> ShaftPosition {
 /// Units per native step as a fraction, from the definitions.
 fn ratio(native: &Native, settings: &Settings) -> (i128, i128) {
     match native {
-        _ if !settings.scaling => (1, 1),
+        Native::Rotary { .. } if !settings.scaling => (1, 1),
         Native::Rotary { per_revolution, .. } => {
             (settings.per_revolution.into(), per_revolution.get().into())
         }
@@ -102,7 +98,7 @@ proptest! {
 }
 
 #[test]
-fn refuses_what_the_sensor_cannot_resolve() {
+fn a_turn_or_a_range_of_nothing_is_refused() {
     let native = rotary(4096, 16);
     for (per_revolution, range) in [(0, 1), (4096, 0)] {
         assert_eq!(Scale::new(&native, &scaled(per_revolution, range)), None);
@@ -110,9 +106,6 @@ fn refuses_what_the_sensor_cannot_resolve() {
     for all in [4096, 65_537, u32::MAX] {
         assert!(Scale::new(&native, &scaled(all, all)).is_some(), "the whole of UNSIGNED32 (CiA 406, 7.2.2)");
     }
-    let settings = Settings { step: 999, ..scaled(1, 100) };
-    assert_eq!(Scale::new(&linear(1000), &settings), None);
-    assert!(Scale::new(&linear(1000), &Settings { step: 1000, ..settings }).is_some());
 }
 
 #[test]
@@ -181,12 +174,50 @@ fn a_way_needs_a_step_that_the_sensor_resolves() {
     assert_eq!(along(rotary(1, 1), 1, u32::MAX), None, "not even one unit");
 }
 
+/// A client that multiplies a position by 6005h:1 gets the travel, whatever bit 2 of 6000h and the sensor are.
 #[test]
-fn nothing_is_not_given() {
-    let per_revolution = NonZeroU32::new(4096).unwrap();
-    let shaft = Native::Rotary { per_revolution, revolutions: NonZeroU32::MIN };
-    let rod = Native::Linear { step: per_revolution, steps: NonZeroU64::new(1 << 25).unwrap() };
-    for native in [shaft, rod] {
-        assert!(!native.gives_step(0) && native.gives_step(u32::MAX));
+fn a_measuring_step_acts_without_the_scaling_function_and_may_be_finer_than_the_sensor() {
+    let settings = |step| Settings {
+        reversed: false,
+        scaling: false,
+        per_revolution: 1,
+        gear: NonZeroU16::MIN,
+        range: 1,
+        step,
+    };
+    for (own, step) in
+        [(1000, 10_000), (1000, 1000), (10_000, 1000), (4096, 999), (4096, 1), (4_000_000_000, 7)]
+    {
+        let native = linear(own);
+        let scale = Scale::new(&native, &settings(step)).unwrap();
+        let positions = i128::from(native.steps().get()) * i128::from(own) / i128::from(step);
+        assert_eq!(i128::from(scale.range().get()), positions.min(1 << 32), "{own} {step}");
+        for total in [0_i64, 1, 77, 5_000_000] {
+            let expected =
+                (i128::from(total) * i128::from(own) / i128::from(step)) % i128::from(scale.range().get());
+            assert_eq!(i128::from(scale.value(shaft_at(total, &scale), 0)), expected, "{own} {step} {total}");
+        }
     }
+    assert_eq!(Scale::new(&linear(1000), &settings(0)), None);
+}
+
+/// A table with 3600 units behind a gear of 10 to 3: 10,800 units in 10 revolutions of the sensor, without end.
+#[test]
+fn a_gear_factor_makes_an_endless_axis_of_revolutions_that_do_not_divide() {
+    let gear = |per_revolution, revolutions, range| {
+        let gear = NonZeroU16::new(revolutions).unwrap();
+        Scale::new(&rotary(8192, 4096), &Settings { gear, ..scaled(per_revolution, range) })
+    };
+    let table = gear(10_800, 10, 3600).unwrap();
+    for total in [0_i64, 8191, 27_306, 27_307, 81_920, -1, -81_920, 123_456_789_012] {
+        let expected = (i128::from(total) * 10_800).div_euclid(81_920).rem_euclid(3600);
+        assert_eq!(i128::from(table.value(shaft_at(total, &table), 0)), expected, "{total}");
+    }
+    assert!(!table.repeats_after(1 << 25), "the code is no whole number of turns of the table");
+    assert!(table.repeats_after(81_920), "ten revolutions are three turns");
+    assert!(
+        gear(3600, 4096, 3600).unwrap().repeats_after(1 << 25),
+        "one turn of the table is the whole code"
+    );
+    assert_eq!(gear(0, 10, 3600), None);
 }

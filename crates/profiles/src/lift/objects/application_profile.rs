@@ -38,6 +38,22 @@ macro_rules! units {
     };
 }
 
+/// The same object for each of the four units, at one index each, with the channel as its sub-index.
+macro_rules! indexes {
+    ($first:literal, $what:literal, $names:literal, $row:expr) => {
+        [
+            Object::highest($first, 1, concat!("Position unit 1 ", $names)),
+            $row($first, concat!("Position unit 1 ", $what)),
+            Object::highest($first + 1, 1, concat!("Position unit 2 ", $names)),
+            $row($first + 1, concat!("Position unit 2 ", $what)),
+            Object::highest($first + 2, 1, concat!("Position unit 3 ", $names)),
+            $row($first + 2, concat!("Position unit 3 ", $what)),
+            Object::highest($first + 3, 1, concat!("Position unit 4 ", $names)),
+            $row($first + 3, concat!("Position unit 4 ", $what)),
+        ]
+    };
+}
+
 /// Unit of positions, defined by 6384h:1.
 const POSITION: &str = "6384h:1";
 
@@ -53,18 +69,21 @@ const fn position(sub: u8, name: &'static str) -> Object {
     sent(measured(0x6383, sub, name, Type::Unsigned32)).unit(POSITION)
 }
 
-/// Not mappable: no pre-defined PDO has the speed, and in the multiplexed PDO each change would be a frame, a thousand
-/// a second.
+/// For the spare TPDOs. The multiplexed PDO does not send it: each change would be a frame, a thousand a second.
 const fn speed(sub: u8, name: &'static str) -> Object {
-    measured(0x6390, sub, name, Type::Integer16).unit("6384h:2")
+    sent(measured(0x6390, sub, name, Type::Integer16)).unit("6384h:2")
 }
 
-const fn low_limit(sub: u8, name: &'static str) -> Object {
-    taken(parameter(0x63B4, sub, name, Type::Integer32)).unit(POSITION)
+const fn area_state(index: u16, name: &'static str) -> Object {
+    sent(measured(index, 1, name, Type::Unsigned8))
 }
 
-const fn high_limit(sub: u8, name: &'static str) -> Object {
-    taken(parameter(0x63B8, sub, name, Type::Integer32)).value(0x7FFF_FFFF).unit(POSITION)
+const fn low_limit(index: u16, name: &'static str) -> Object {
+    taken(parameter(index, 1, name, Type::Integer32)).unit(POSITION)
+}
+
+const fn high_limit(index: u16, name: &'static str) -> Object {
+    taken(parameter(index, 1, name, Type::Integer32)).value(0x7FFF_FFFF).unit(POSITION)
 }
 
 const fn operating_status(sub: u8, name: &'static str) -> Object {
@@ -76,7 +95,7 @@ const fn resolution(sub: u8, name: &'static str) -> Object {
 }
 
 const fn revolutions(sub: u8, name: &'static str) -> Object {
-    measured(0x63C2, sub, name, Type::Unsigned32)
+    measured(0x63C2, sub, name, Type::Unsigned16)
 }
 
 const fn supported_warnings(sub: u8, name: &'static str) -> Object {
@@ -134,8 +153,9 @@ pub(super) const PARTS: &[&[Object]] = &[
             .unit("0.1 mm/s"),
     ],
     &units!(0x6390, "speed", "Speeds", speed),
-    &units!(0x63B4, "low limit", "Position unit low limits", low_limit),
-    &units!(0x63B8, "high limit", "Position unit high limits", high_limit),
+    &indexes!(0x63B0, "area state", "area states", area_state),
+    &indexes!(0x63B4, "low limit", "low limits", low_limit),
+    &indexes!(0x63B8, "high limit", "high limits", high_limit),
     &units!(0x63C0, "operating status", "Position unit operating status", operating_status),
     &units!(0x63C1, "resolution", "Position unit resolutions", resolution),
     &units!(0x63C2, "revolutions", "Position unit revolutions", revolutions),

@@ -152,8 +152,15 @@ impl Fields {
         let devices = self.devices(image);
         match at.index {
             0x2313 | 0x6480 | 0x6482 => devices.has(Devices::LOAD),
+            // Each change of a speed would be a frame.
+            0x6390 => false,
             0x2303 | 0x6383..=0x63C5 => {
-                let unit = self.units.get(usize::from(at.sub).wrapping_sub(1));
+                let number = if let 0x63B0..=0x63BB = at.index {
+                    at.index & 3
+                } else {
+                    u16::from(at.sub).wrapping_sub(1)
+                };
+                let unit = self.units.get(usize::from(number));
                 devices.has(Devices::POSITION) && unit.is_some_and(|unit| unit.source.u8(image) != 0)
             }
             _ => true,

@@ -16,7 +16,7 @@ pub use choice::UNKNOWN_CHOICES;
 pub use manufacturer::SWITCHED_OFF;
 pub use values::Fields;
 
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Entry, Groups, Object};
 use canopen::sdo::{Abort, Multiplexer};
 
 use super::devices::{Devices, PROFILE as NUMBER};
@@ -84,7 +84,7 @@ impl Profile for Objects {
         Objects { fields, calls: Calls::default(), lamps: panel::LampStates::default() }
     }
 
-    fn initialise(&mut self, image: &mut [u8], _is_stored: bool) {
+    fn initialise(&mut self, image: &mut [u8], _stored: Groups) {
         self.fields.initialise(image);
     }
 

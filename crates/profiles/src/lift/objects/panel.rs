@@ -27,8 +27,8 @@ pub(super) struct PanelFields {
 #[derive(Debug, Default)]
 pub(super) struct LampStates {
     pub(super) milliseconds: u32,
-    /// The lifts that have lit a lamp: a lift does not switch off a lamp that another lift has lit.
-    lit_by: [u8; LAMPS],
+    /// The lifts and doors that have lit a lamp: a lift or a door does not switch off a lamp that another one has lit.
+    lit_by: [u32; LAMPS],
 }
 
 impl PanelFields {
@@ -145,10 +145,10 @@ impl LampStates {
 /// Effect of an output on the lamp with these words: the word that switches it off, the word that switches it on, and
 /// its word with the public structure.
 #[inline(never)]
-fn says(words: [Field; 3], output: Word, lit_by: &mut u8, image: &[u8]) -> Option<Light> {
+fn says(words: [Field; 3], output: Word, lit_by: &mut u32, image: &[u8]) -> Option<Light> {
     let [off, on, own] = words.map(|at| word(at, image));
     if own != Word::default() && own.is_meant_by(output) {
-        return follow(lit_by, own.lifts() & output.lifts(), output.light());
+        return follow(lit_by, own.places(output), output.light());
     }
     if off == on {
         return None;
@@ -157,13 +157,13 @@ fn says(words: [Field; 3], output: Word, lit_by: &mut u8, image: &[u8]) -> Optio
     (output == on || output == off).then_some(light)
 }
 
-/// The new state of a lamp after these lifts light it or switch it off; `None` while other lifts still light it.
-fn follow(lit_by: &mut u8, lifts: u8, light: Light) -> Option<Light> {
+/// The new state of a lamp after these places light it or switch it off; `None` while other places still light it.
+fn follow(lit_by: &mut u32, places: u32, light: Light) -> Option<Light> {
     if light == Light::OFF {
-        *lit_by &= !lifts;
+        *lit_by &= !places;
         return (*lit_by == 0).then_some(light);
     }
-    *lit_by |= lifts;
+    *lit_by |= places;
     Some(light)
 }
 

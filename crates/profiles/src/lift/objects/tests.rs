@@ -242,7 +242,7 @@ fn units_take_their_sensor_where_the_table_says() {
     node.write(0x6382, 3, 1).unwrap();
     node.write(0x2301, 3, 2).unwrap();
     assert_eq!(node.read(0x2302, 3), 0, "the offset belonged to the other sensor");
-    assert_eq!(node.read(0x63C4, 1), 0x2D);
+    assert_eq!(node.read(0x63C4, 1), 0x102D);
 }
 
 #[test]
@@ -399,6 +399,51 @@ fn a_lamp_that_a_pdo_has_put_out_is_lit_by_nobody() {
     assert_eq!(node.output(word(1, 0)), [false, false]);
 }
 
+/// One index for each unit (CiA 417), as in the limits.
+#[test]
+fn the_area_state_of_a_unit_follows_its_own_limits_and_is_sent() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 1).unwrap();
+    node.write(0x2301, 2, 1).unwrap();
+    for sub in 1..=2 {
+        node.sample();
+        node.write(0x6382, sub, 5000).unwrap();
+    }
+    node.write(0x63B8, 1, 4999).unwrap();
+    node.write(0x63B5, 1, 5001).unwrap();
+    node.sample();
+    assert_eq!([0x63B0, 0x63B1, 0x63B2].map(|index| node.read(index, 1)), [2, 4, 0]);
+    assert_eq!([1, 2].map(|sub| node.read(0x2303, sub)), [2, 4], "2303h has the same bits");
+    let is_sent = |index, sub| node.objects.broadcasts(Multiplexer { index, sub }, &node.image);
+    assert!(is_sent(0x63B0, 1) && is_sent(0x63B1, 1));
+    assert!(!is_sent(0x63B2, 1), "a unit without a sensor");
+    assert!(!is_sent(0x6390, 1), "each change of a speed would be a frame");
+}
+
+#[test]
+fn a_lamp_of_two_doors_stays_lit_until_both_doors_are_answered() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 8).unwrap();
+    // Car call 4 of lifts 1 and 2, doors 1 and 2.
+    node.write(0x6200, 1, 0x00_03_00_03_04_05).unwrap();
+    let output = |lifts: i64, doors: i64, on: i64| 0x0405 | lifts << 16 | doors << 32 | on << 40;
+    for (lifts, doors, on, lit) in [
+        (1, 1, 1, true),
+        (1, 2, 0, true),
+        (1, 1, 0, false),
+        (1, 3, 1, true),
+        (1, 2, 0, true),
+        (2, 1, 0, true),
+        (1, 1, 0, false),
+        (3, 0xFF, 1, true),
+        (1, 0xFF, 0, true),
+        (2, 1, 0, true),
+        (2, 2, 0, false),
+    ] {
+        assert_eq!(node.output(output(lifts, doors, on)), [lit, false], "lifts {lifts}, doors {doors}: {on}");
+    }
+}
+
 /// A node as delivered, and one with virtual devices other than panels.
 #[test]
 fn a_node_that_is_no_panel_has_no_calls_and_no_lamps() {
@@ -505,7 +550,7 @@ fn a_reset_silences_what_is_not_chosen() {
     let mut node = Node::new();
     node.write(0x2305, 0, 3).unwrap();
     DICTIONARY.field(0x2305, 0).set(&mut node.image, &[2]);
-    node.objects.initialise(&mut node.image, false);
+    node.objects.initialise(&mut node.image, canopen::dictionary::Groups::NONE);
     assert_eq!([0x1901, 0x1906].map(|index| node.read(index, 1) >> 31), [0, 1]);
     assert_eq!((node.read(0x1000, 0), node.read(0x6000, 1)), (0x0A00_01A1, 0x0A00));
 }

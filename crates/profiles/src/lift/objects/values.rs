@@ -6,7 +6,7 @@ use crate::encoder::Area;
 use crate::encoder::objects::Sensors;
 use crate::lift::devices::Devices;
 use crate::lift::load::{self, Point};
-use crate::lift::position::{self, NO_OFFSET, Source, UNITS, UnitParameters, UnitValues};
+use crate::lift::position::{self, AREA, NO_OFFSET, Source, UNITS, UnitParameters, UnitValues};
 use crate::lift::{Parameters, Snapshot};
 use crate::pressure::objects::Places;
 use canopen::dictionary::{Dictionary, Field};
@@ -47,6 +47,7 @@ pub(super) struct UnitFields {
     pub(super) position: Field,
     pub(super) reading: Field,
     speed: Field,
+    area: Field,
     limits: [Field; 2],
     operating_status: Field,
     resolution: Field,
@@ -65,7 +66,8 @@ impl UnitFields {
             position: d.field(0x6383, sub),
             reading: d.field(0x2304, sub),
             speed: d.field(0x6390, sub),
-            limits: [d.field(0x63B4, sub), d.field(0x63B8, sub)],
+            area: d.field(0x63AF + sub as u16, 1),
+            limits: [d.field(0x63B3 + sub as u16, 1), d.field(0x63B7 + sub as u16, 1)],
             operating_status: d.field(0x63C0, sub),
             resolution: d.field(0x63C1, sub),
             revolutions: d.field(0x63C2, sub),
@@ -104,6 +106,7 @@ impl UnitFields {
             self.position.store(image, values.position.to_le_bytes());
             self.reading.store(image, values.reading.to_le_bytes());
             self.state.store(image, [values.state]);
+            self.area.store(image, [values.state & AREA]);
         }
     }
 }

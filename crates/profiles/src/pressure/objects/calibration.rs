@@ -100,6 +100,12 @@ impl Places {
         }
     }
 
+    /// The places of start and end of the range.
+    pub(crate) fn range(&self) -> [Field; 2] {
+        let [start, end, ..] = self.pressure;
+        [start, end]
+    }
+
     /// The calibration in the image. An impossible calibration acts as the default one.
     pub(crate) fn calibration(&self, image: &[u8]) -> Calibration {
         Some(self.load(image)).filter(Calibration::is_valid).unwrap_or_default()

@@ -18,6 +18,20 @@ const fn sensor_type(sub: u8, name: &'static str, code: i64) -> Object {
     Object::new(0x6110, sub, name, Type::Unsigned16, Access::Const).value(code)
 }
 
+/// 1: normal operation, the only mode.
+const fn operating_mode(sub: u8, name: &'static str) -> Object {
+    parameter(0x6112, sub, name, Type::Unsigned8).limits(1, 1).value(1)
+}
+
+/// A new value each millisecond.
+const fn sample_rate(sub: u8, name: &'static str) -> Object {
+    Object::new(0x6114, sub, name, Type::Unsigned32, Access::ReadOnly).value(1000).unit("us")
+}
+
+const fn autotare(sub: u8, name: &'static str) -> Object {
+    Object::new(0x6139, sub, name, Type::Unsigned32, Access::WriteOnly).handled()
+}
+
 const fn autozero(sub: u8, name: &'static str) -> Object {
     Object::new(0x6125, sub, name, Type::Unsigned32, Access::WriteOnly).handled()
 }
@@ -46,6 +60,12 @@ pub(crate) const REAL: &[Object] = &[
     both(0x6110, "AI sensor type"),
     sensor_type(1, "Pressure sensor type", 90),
     sensor_type(2, "Temperature sensor type", 100),
+    both(0x6112, "AI operating mode"),
+    operating_mode(1, "Pressure operating mode"),
+    operating_mode(2, "Temperature operating mode"),
+    both(0x6114, "AI ADC sample rate"),
+    sample_rate(1, "Pressure ADC sample rate"),
+    sample_rate(2, "Temperature ADC sample rate"),
     both(0x6124, "AI input offset"),
     parameter(0x6124, 1, "Pressure offset", Type::Real32).unit(PV),
     parameter(0x6124, 2, "Temperature offset", Type::Real32).unit(PV),
@@ -67,6 +87,13 @@ pub(crate) const REAL: &[Object] = &[
     both(0x6132, "AI decimal digits process value"),
     digits(1, "Pressure decimal digits"),
     digits(2, "Temperature decimal digits"),
+    // A TPDO of type 255 is sent when the process value has changed by so much; 0: with each change.
+    both(0x6133, "AI interrupt delta input process value"),
+    parameter(0x6133, 1, "Pressure interrupt delta", Type::Real32).unit(PV),
+    parameter(0x6133, 2, "Temperature interrupt delta", Type::Real32).unit(PV),
+    both(0x6139, "AI autotare"),
+    autotare(1, "Pressure autotare"),
+    autotare(2, "Temperature autotare"),
     both(0x6148, "AI span start"),
     parameter(0x6148, 1, "Pressure span start", Type::Real32).unit(PV),
     parameter(0x6148, 2, "Temperature span start", Type::Real32).unit(PV).real(-40.0),

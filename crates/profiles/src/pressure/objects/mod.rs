@@ -3,6 +3,7 @@
 pub(crate) mod calibration;
 mod device_profile;
 mod faults;
+mod functions;
 mod manufacturer;
 mod pdos;
 mod rules;
@@ -12,10 +13,12 @@ pub(crate) use calibration::{CALIBRATION, Places};
 pub(crate) use device_profile::{INTEGER, REAL};
 pub use faults::FAULTS;
 pub(crate) use faults::SENSOR_BREAK;
+use functions::States;
+pub(crate) use functions::{ALARM_BLOCK, EXTREMES};
 pub(crate) use manufacturer::{STATUS_AND_USER, STATUS_REGISTER};
 pub use values::Fields;
 
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Entry, Group, Groups, Object};
 use canopen::sdo::Abort;
 
 use super::{Parameters, Snapshot, Transmitter};
@@ -36,8 +39,10 @@ pub const ROWS: &[&[Object]] = &[
     &error_behaviour(0),
     &PDOS,
     CALIBRATION,
+    EXTREMES,
     STATUS_AND_USER,
     REAL,
+    ALARM_BLOCK,
     INTEGER,
 ];
 
@@ -62,8 +67,9 @@ pub(crate) const fn handles_shifted(index: u16, sub: u8, shift: u16) -> bool {
 #[derive(Debug)]
 pub struct Objects {
     fields: &'static Fields,
-    /// Whether each channel shows the value of an intact sensor.
-    is_measured: [bool; 2],
+    /// The process value of each channel without its offset, from an intact sensor.
+    measured: [Option<f32>; 2],
+    states: States,
 }
 
 impl Profile for Objects {
@@ -74,7 +80,13 @@ impl Profile for Objects {
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, is_measured: [false; 2] }
+        Objects { fields, measured: [None; 2], states: States::default() }
+    }
+
+    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
+        if !stored.contains(Group::Application) {
+            self.fields.default_spans(image);
+        }
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {
@@ -82,8 +94,21 @@ impl Profile for Objects {
     }
 
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
-        self.is_measured = [snapshot.pressure.is_measured, snapshot.temperature.is_measured];
+        self.measured = [snapshot.pressure.measured, snapshot.temperature.measured];
         self.fields.publish(snapshot, image);
+        let values = [&snapshot.pressure, &snapshot.temperature];
+        self.fields.functions.follow(values, &mut self.states, image);
+    }
+
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        let index = entry.index();
+        let index = if index < 0x6000 { index } else { index.wrapping_sub(self.fields.shift) };
+        let value = entry.field().u8(image);
+        self.fields.functions.written(index, entry.sub(), value, &mut self.states);
+    }
+
+    fn is_quiet(&self, place: usize) -> bool {
+        self.fields.is_quiet(&self.states, place)
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {
@@ -91,7 +116,7 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        self.fields.write(entry, bytes, self.is_measured, image)
+        self.fields.write(entry, bytes, self.measured, image)
     }
 
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {

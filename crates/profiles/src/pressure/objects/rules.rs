@@ -11,6 +11,10 @@ use canopen::sdo::Abort;
 pub(super) enum Rule {
     /// 6125h: the present process value becomes 0.
     Autozero,
+    /// 6139h: the present process value becomes 0 by a tare.
+    Autotare,
+    /// 6503h: a process value, or none.
+    AlarmLink,
     /// 6131h:1: only units of pressure are accepted.
     PressureUnit,
     /// 6131h:2: only units of temperature are accepted.
@@ -24,6 +28,8 @@ impl Rule {
     pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
         match (index, sub) {
             (0x6125, 1..) => Some(Rule::Autozero),
+            (0x6139, 1..) => Some(Rule::Autotare),
+            (0x6503, 1..) => Some(Rule::AlarmLink),
             (0x6131, 1) => Some(Rule::PressureUnit),
             (0x6131, 2) => Some(Rule::TemperatureUnit),
             _ => match calibration::Rule::of(index, sub) {
@@ -39,25 +45,37 @@ impl Rule {
     }
 }
 
-/// The value of 6125h that starts the autozero: "zero".
+/// The value of 6125h that starts the autozero: "zero". `TARE_SIGNATURE`: that of 6139h, "tare".
 const ZERO_SIGNATURE: [u8; 4] = *b"zero";
+const TARE_SIGNATURE: [u8; 4] = *b"tare";
 
 impl Fields {
     /// Checks a write to an object that has one of the rules above.
-    /// `is_measured`: whether each channel shows the value of an intact sensor.
+    /// `measured`: the process value of each channel without its offset, from an intact sensor.
     pub(super) fn write(
         &self,
         entry: &Entry,
         bytes: &[u8],
-        is_measured: [bool; 2],
+        measured: [Option<f32>; 2],
         image: &mut [u8],
     ) -> Result<(), Abort> {
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let is_known = match Rule::shifted(entry.index(), entry.sub(), self.shift) {
             Some(Rule::Autozero) => {
-                return self.autozero(entry.sub(), bytes, is_measured, image);
+                return self.zero(entry.sub(), bytes == ZERO_SIGNATURE, false, measured, image);
             }
-            Some(Rule::Calibration(rule)) => return self.calibration.write(rule, entry, bytes, image),
+            Some(Rule::Autotare) => {
+                return self.zero(entry.sub(), bytes == TARE_SIGNATURE, true, measured, image);
+            }
+            Some(Rule::AlarmLink) => self.functions.can_link(code),
+            Some(Rule::Calibration(rule)) => {
+                self.calibration.write(rule, entry, bytes, image)?;
+                if (entry.index(), entry.sub()) == (0x2200, 1) || (entry.index(), entry.sub()) == (0x2200, 2)
+                {
+                    self.follow_range(entry, f32::from_bits(code), image);
+                }
+                return Ok(());
+            }
             Some(Rule::PressureUnit) => Unit::pressure(code).is_some(),
             Some(Rule::TemperatureUnit) => Unit::temperature(code).is_some(),
             None => true,
@@ -65,27 +83,51 @@ impl Fields {
         if is_known { Ok(()) } else { Err(Abort::InvalidValue) }
     }
 
-    /// Changes the offset so that the present process value becomes 0. Refused while the sensor gives no value; whether
+    /// Changes the offset, or the tare, so that the present process value becomes 0; a new offset ends the tare. Refused while the sensor gives no value; whether
     /// the integer formats can show the value does not matter.
-    fn autozero(
+    fn zero(
         &self,
         sub: u8,
-        bytes: &[u8],
-        [pressure, temperature]: [bool; 2],
+        is_signed: bool,
+        is_tare: bool,
+        [pressure, temperature]: [Option<f32>; 2],
         image: &mut [u8],
     ) -> Result<(), Abort> {
-        if bytes != ZERO_SIGNATURE {
+        if !is_signed {
             return Err(Abort::NotStored);
         }
-        let (channel, is_measured) =
+        let (channel, measured) =
             if sub == 1 { (&self.pressure, pressure) } else { (&self.temperature, temperature) };
-        let value = channel.process_value.f32(image);
+        let measured = measured.ok_or(Abort::DeviceState)?;
+        let offset = if is_tare { channel.offset.f32(image) } else { -measured };
+        let tare = if is_tare { measured + offset } else { 0.0 };
         // The largest value stands for one that no REAL32 can show.
-        if !is_measured || value.abs() >= f32::MAX {
+        if !tare.is_finite() {
             return Err(Abort::DeviceState);
         }
-        let offset = channel.offset.f32(image) - value;
         channel.offset.store(image, offset.to_le_bytes());
+        channel.tare.store(image, tare.to_le_bytes());
         Ok(())
+    }
+
+    /// The default span of the pressure (6148h, 6149h) is the range of the transducer.
+    #[inline(never)]
+    pub(super) fn default_spans(&self, image: &mut [u8]) {
+        let unit = self.pressure_unit(image);
+        for (span, limit) in
+            [self.pressure.span.start, self.pressure.span.end].iter().zip(self.calibration.range())
+        {
+            span.store(image, unit.of(limit.f32(image)).to_le_bytes());
+        }
+    }
+
+    /// A span that is the range of the transducer follows a write to 2200h:1 or 2200h:2.
+    #[inline(never)]
+    fn follow_range(&self, entry: &Entry, pascal: f32, image: &mut [u8]) {
+        let unit = self.pressure_unit(image);
+        let span = if entry.sub() == 1 { self.pressure.span.start } else { self.pressure.span.end };
+        if span.f32(image).to_bits() == unit.of(entry.field().f32(image)).to_bits() {
+            span.store(image, unit.of(pascal).to_le_bytes());
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::calibration::Places;
 use super::faults::FlagFields;
+use super::functions::{Functions, States};
 use crate::pressure::{ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
 use canopen::dictionary::{Dictionary, Field};
 
@@ -14,11 +15,12 @@ pub(super) struct Channel {
     process_value32: Field,
     pub(super) status: Field,
     pub(super) offset: Field,
+    pub(super) tare: Field,
     scaling_factor: Field,
     scaling_offset: Field,
     unit: Field,
     digits: Field,
-    span: Span<Field>,
+    pub(super) span: Span<Field>,
     span16: Span<Field>,
     span32: Span<Field>,
     filter_type: Field,
@@ -32,6 +34,7 @@ pub struct Fields {
     pub(super) temperature: Channel,
     pub(super) calibration: Places,
     pub(super) flags: FlagFields,
+    pub(super) functions: Functions,
     /// Added to the index of every object of the device profile.
     pub(super) shift: u16,
 }
@@ -45,6 +48,7 @@ impl Channel {
             process_value32: d.field(0x9130 + shift, sub),
             status: d.field(0x6150 + shift, sub),
             offset: d.field(0x6124 + shift, sub),
+            tare: d.field(0x2210, sub),
             scaling_factor: d.field(0x6126 + shift, sub),
             scaling_offset: d.field(0x6127 + shift, sub),
             unit: d.field(0x6131 + shift, sub),
@@ -77,6 +81,7 @@ impl Channel {
             scaling_offset: self.scaling_offset.f32(image),
             unit,
             offset: self.offset.f32(image),
+            tare: self.tare.f32(image),
             digits: self.digits.u8(image),
             span: Span { start: self.span.start.f32(image), end: self.span.end.f32(image) },
             span16: Span { start: start16, end: end16 },
@@ -93,8 +98,18 @@ impl Fields {
             temperature: Channel::new(d, shift, 2),
             calibration: Places::new(d),
             flags: FlagFields::new(d),
+            functions: Functions::new(d, shift),
             shift,
         }
+    }
+
+    /// Whether the value at this place belongs to a channel whose changes are below its threshold.
+    pub(super) fn is_quiet(&self, states: &States, place: usize) -> bool {
+        [&self.pressure, &self.temperature].into_iter().enumerate().any(|(number, channel)| {
+            let Channel { field_value, process_value, process_value16, process_value32, .. } = channel;
+            let fields = [field_value, process_value, process_value16, process_value32];
+            states.is_quiet(number) && fields.iter().any(|field| field.is_at(place))
+        })
     }
 
     /// Copies a snapshot into the image.
@@ -103,9 +118,13 @@ impl Fields {
         self.temperature.publish(&snapshot.temperature, image);
     }
 
+    pub(super) fn pressure_unit(&self, image: &[u8]) -> Unit {
+        Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR)
+    }
+
     /// The parameters in the image. An impossible unit acts as the default one.
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
-        let pressure = Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR);
+        let pressure = self.pressure_unit(image);
         let temperature = Unit::temperature(self.temperature.unit.u32(image)).unwrap_or(Unit::CELSIUS);
         Parameters {
             pressure: self.pressure.parameters(pressure, image),
