@@ -173,14 +173,17 @@ impl Services {
 
     fn receive(&mut self, node: &mut impl Shared) {
         while let Some(received) = self.frames.dequeue() {
-            let next =
-                self.call(node, |protocol, out| protocol.on_service_frame(&received.frame, received.at, out));
+            let next = self.call(node, |protocol, out| {
+                protocol.self_test(bsp::self_test::value);
+                protocol.on_service_frame(&received.frame, received.at, out)
+            });
             let _ = self.settle(next, node);
         }
     }
 
     fn report_bus(&mut self, node: &mut impl Shared) {
         let now = Clock::now();
+        bsp::self_test::note_bus();
         let state = self.can.state();
         if state == BusState::Off {
             self.back_off.bus_off(now);

@@ -80,6 +80,11 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     tools.args(["build", "--profile", "sim", "-p", "flash", "-p", "sign"]);
     progress::build("tools", &mut tools)?;
     let toolchain = Toolchain::ensure()?;
+    if flags.development && flags.application.is_none() {
+        // The images that `cargo xtask bringup` compares with the flash.
+        let images = images::compile_node(&toolchain, images::CHIP)?;
+        return become_program(&mut flags.tool(&images.join("bootloader"), &images.join("firmware")));
+    }
     let application = match &flags.application {
         Some(path) => std::path::absolute(path)?,
         None => images::compile_application(&toolchain)?,

@@ -15,9 +15,9 @@ pub(crate) fn dir() -> PathBuf {
     target_dir().join(TRIPLE).join("release")
 }
 
-/// A bootloader for a board on a desk, emulated or not: it starts unsigned images, and trusts the development key,
-/// which everybody knows.
-pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development"];
+/// Images for a board on a desk, emulated or not. The bootloader starts unsigned images, and trusts the development key,
+/// which everybody knows. The application counts more for its self-test, and obeys its commands.
+pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development,firmware/development"];
 
 /// The default chip of the images.
 pub(crate) const CHIP: &str = "stm32f446";
@@ -78,7 +78,7 @@ pub(crate) fn compile_bootloader(toolchain: &Toolchain, keys: &[String]) -> Resu
     }
     command.envs(KEYS.iter().zip(keys));
     if keys.is_empty() {
-        command.args(DEVELOPMENT);
+        command.args(["--features", "development"]);
     }
     progress::build("bootloader", &mut command)?;
     Ok(dir().join("bootloader"))

@@ -23,6 +23,7 @@ mod memory;
 mod packed;
 mod position_record;
 mod protocol;
+mod self_test;
 mod setup;
 mod store_job;
 mod stored;

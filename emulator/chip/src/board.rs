@@ -1,5 +1,6 @@
 //! The properties of the board around the chip.
 
+pub use crate::plant::FrontEnd;
 pub use crate::spi::SsiFormat;
 
 use crate::plant::BUTTONS;
@@ -22,10 +23,16 @@ impl ButtonPin {
 }
 
 /// The board, and the values that the factory has set in the chip.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Board {
     /// Frequency of the clock on OSC_IN in hertz; `None` without one.
     pub hse: Option<u64>,
+    /// Frequency of the LSI in hertz: 17,000 to 47,000 (DS10693, LSI oscillator characteristics).
+    pub lsi: u32,
+    /// The analogue front end.
+    pub front_end: FrontEnd,
+    /// The pin that puts the CAN transceiver to sleep, with the level that does.
+    pub standby: (char, u32, bool),
     /// Lines of the incremental encoder: a revolution has four counts for each line.
     pub encoder_lines: u32,
     /// The format of the absolute encoder's word; the encoder answers on MISO of every SPI.
@@ -43,6 +50,9 @@ impl Default for Board {
     fn default() -> Self {
         Self {
             hse: Some(8_000_000),
+            lsi: 32_000,
+            front_end: FrontEnd::default(),
+            standby: ('B', 12, true),
             encoder_lines: 1024,
             ssi: SsiFormat::default(),
             buttons: [ButtonPin::new('C', 13, false, Some(true)), ButtonPin::new('C', 10, false, None)],

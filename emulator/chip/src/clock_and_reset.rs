@@ -84,7 +84,7 @@ impl Stm32f4 {
             Unit::Spi(index) => self.spis[index].reset(),
             Unit::Can(0) => self.can.reset_can1(),
             Unit::Can(_) => self.can.reset_can2(),
-            Unit::Iwdg => self.iwdg = Iwdg::new(),
+            Unit::Iwdg => self.iwdg = Iwdg::new(self.board.lsi),
             Unit::Crc => self.crc = CrcUnit::new(),
             Unit::Rcc | Unit::Flash | Unit::Dbgmcu | Unit::BackupRam | Unit::Signature | Unit::Absent => {}
         }

@@ -62,6 +62,14 @@ pub enum Breach {
         /// The sample point, as a share of the bit in permille.
         permille: u32,
     },
+    /// CAN1 joins the bus while its transceiver sleeps.
+    #[error("CAN joins the bus with its transceiver asleep: P{port}{pin}")]
+    Asleep {
+        /// The port of the pin that puts the transceiver to sleep: `'A'` to `'I'`.
+        port: char,
+        /// The pin: 0 to 15.
+        pin: u32,
+    },
     /// A DMA stream is enabled before the flags of its last transfer were cleared (RM0390 section 9.5.5, EN).
     #[error("stream {stream} of DMA{controller} begins with flags of its last transfer")]
     DmaFlags {
@@ -235,6 +243,10 @@ impl Stm32f4 {
         self.rules.check(hears, pin(CAN_RX, "CAN1_RX"));
         let speaks = looped || silent || self.ports[B].alternate(CAN_TX, CAN_FUNCTION);
         self.rules.check(speaks, pin(CAN_TX, "CAN1_TX"));
+        // The pin has a pull resistor on a board with such a transceiver: it wakes by an output only.
+        let (port, pin, asleep) = self.board.standby;
+        let is_awake = self.output(port, pin) == Some(!asleep);
+        self.rules.check(looped || is_awake, Breach::Asleep { port, pin });
         let (before, after) = (field(timing, 16, 4) + 2, field(timing, 20, 3) + 1);
         let permille = 1000 * before / (before + after);
         self.rules.check(SAMPLE_POINT.contains(&permille), Breach::SamplePoint { permille });

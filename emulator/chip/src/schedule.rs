@@ -176,7 +176,7 @@ impl Stm32f4 {
     /// Resets the chip when the watchdog has expired.
     fn watch(&mut self, now: Time) {
         if now >= self.iwdg.deadline() {
-            self.iwdg = Iwdg::new();
+            self.iwdg = Iwdg::new(self.board.lsi);
             self.asked = Some(Cause::Watchdog);
             self.effects.push_back(Effect::Reset);
         }

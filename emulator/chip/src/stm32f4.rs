@@ -77,7 +77,7 @@ impl Stm32f4 {
         let clocks = Clocks::RESET;
         let mut chip = Self {
             variant,
-            plant: Plant::new(board.encoder_lines),
+            plant: Plant::new(&board),
             rcc: Rcc::new(variant, board.hse),
             pwr: Pwr::new(variant),
             flash: Flash::new(variant, board.write_protected),
@@ -93,7 +93,7 @@ impl Stm32f4 {
             dmas: Default::default(),
             spis: SPIS.each_ref().map(|place| Spi::new(clocks.apb_cycle(place.bus), Ssi::new(board.ssi))),
             can: DualCan::new(clocks.pclk1()),
-            iwdg: Iwdg::new(),
+            iwdg: Iwdg::new(board.lsi),
             crc: CrcUnit::new(),
             backup_ram: BackupRam::default(),
             clocks,

@@ -79,8 +79,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         };
         self.vector(taken, exc_return, entry);
         let core = self.cpu.get_data_mut();
-        let latency = core.now.since(pended);
-        core.stats.entered(taken, latency, core.now, pc);
+        core.stats.entered(taken, pended, core.now, pc);
     }
 
     /// Starts the handler of an exception whose frame is on the stack.
@@ -157,9 +156,11 @@ impl<P: Peripherals + 'static> Machine<P> {
             return self.take_fault(Fault::bad_return(exc_return));
         }
         let core = self.cpu.get_data_mut();
+        let requested = core.nvic.pending_set();
         core.nvic.deactivate(ending);
-        core.stamp(core.nvic.pending_set() & ending.bit());
-        core.stats.left();
+        // A request that came while the handler ran keeps its time. A line that is still up requests now.
+        core.stamp(core.nvic.pending_set() & !requested);
+        core.stats.left(core.now);
         if ending != Exception::NMI {
             self.set(RegisterARM::FAULTMASK, 0);
         }
@@ -195,9 +196,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         let pended = self.cpu.get_data().pended[usize::from(exception.0)];
         self.vector(exception, exc_return, TAIL_CHAIN);
         let core = self.cpu.get_data_mut();
-        let latency = core.now.since(pended);
         core.stats.tail_chained += 1;
-        core.stats.entered(exception, latency, core.now, exc_return);
+        core.stats.entered(exception, pended, core.now, exc_return);
     }
 
     fn pop_frame(&mut self, exc_return: u32) {

@@ -217,7 +217,7 @@ impl<P: Peripherals> Core<P> {
         self.nvic = Nvic::default();
         self.scb = Scb::default();
         self.systick = SysTick::default();
-        self.stats.unwound();
+        self.stats.unwound(self.now);
         self.halt = None;
         self.unmapped = None;
         self.lost_store = None;

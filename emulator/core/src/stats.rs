@@ -17,8 +17,10 @@ pub struct Activity {
     pub worst_instructions: u64,
     /// Most cycles in one activation.
     pub worst_cycles: u64,
-    /// Longest time from pending to the first instruction.
+    /// Longest time from the request to the first instruction.
     pub worst_latency: Time,
+    /// Longest time from the request to the end of the activation that serves it.
+    pub worst_response: Time,
     /// Instant of the first entry.
     pub first_entry: Time,
     /// Instant of the latest entry.
@@ -66,17 +68,19 @@ pub struct Stats {
     preempted: Vec<Running>,
 }
 
-/// One activation that has not ended.
+/// One activation that has not ended. It begins with its request, not with its entry: a request that comes while the
+/// handler runs is served by the next activation, and waits for it meanwhile.
 #[derive(Clone, Copy, Debug)]
 struct Running {
     exception: Exception,
+    requested: Time,
     instructions: u64,
     cycles: u64,
 }
 
 impl Running {
-    fn new(exception: Exception) -> Running {
-        Running { exception, instructions: 0, cycles: 0 }
+    fn new(exception: Exception, requested: Time) -> Running {
+        Running { exception, requested, instructions: 0, cycles: 0 }
     }
 }
 
@@ -89,7 +93,7 @@ impl Default for Stats {
             exceptions: [Activity::default(); Exception::COUNT],
             tail_chained: 0,
             trace: 0xCBF2_9CE4_8422_2325,
-            running: Running::new(Exception::THREAD),
+            running: Running::new(Exception::THREAD, Time::ZERO),
             preempted: Vec::new(),
         }
     }
@@ -106,6 +110,7 @@ impl Stats {
             activity.worst_instructions = 0;
             activity.worst_cycles = 0;
             activity.worst_latency = Time::ZERO;
+            activity.worst_response = Time::ZERO;
         }
     }
 
@@ -117,10 +122,10 @@ impl Stats {
         self.running.cycles += u64::from(cycles);
     }
 
-    pub(crate) fn entered(&mut self, exception: Exception, latency: Time, at: Time, pc: u32) {
+    pub(crate) fn entered(&mut self, exception: Exception, requested: Time, at: Time, pc: u32) {
         let activity = &mut self.exceptions[usize::from(exception.0)];
-        activity.note_entry(latency, at);
-        let preempted = std::mem::replace(&mut self.running, Running::new(exception));
+        activity.note_entry(at.since(requested), at);
+        let preempted = std::mem::replace(&mut self.running, Running::new(exception, requested));
         self.preempted.push(preempted);
         for word in [u64::from(exception.0), at.0, u64::from(pc)] {
             // FNV-1a over words.
@@ -128,20 +133,22 @@ impl Stats {
         }
     }
 
-    pub(crate) fn left(&mut self) {
+    pub(crate) fn left(&mut self, at: Time) {
         let Some(preempted) = self.preempted.pop() else { return };
-        let Running { exception, instructions, cycles } = std::mem::replace(&mut self.running, preempted);
+        let ended = std::mem::replace(&mut self.running, preempted);
+        let Running { exception, requested, instructions, cycles } = ended;
         let activity = &mut self.exceptions[usize::from(exception.0)];
         activity.instructions += instructions;
         activity.cycles += cycles;
         activity.worst_instructions = activity.worst_instructions.max(instructions);
         activity.worst_cycles = activity.worst_cycles.max(cycles);
+        activity.worst_response = activity.worst_response.max(at.since(requested));
     }
 
     /// A reset ends every activation.
-    pub(crate) fn unwound(&mut self) {
+    pub(crate) fn unwound(&mut self, at: Time) {
         while !self.preempted.is_empty() {
-            self.left();
+            self.left(at);
         }
     }
 }

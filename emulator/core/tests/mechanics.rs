@@ -5,7 +5,7 @@ mod bench;
 
 use bench::{Bench, Verdict};
 use canbus::Time;
-use emulator::Mechanism;
+use emulator::{Exception, Mechanism};
 
 /// The program passes with the mechanism, and fails or hangs without it.
 fn shows(program: &str, mechanism: Mechanism) {
@@ -73,6 +73,20 @@ fn wfi_sleeps_until_the_next_tick() {
 #[test]
 fn a_second_interrupt_is_chained() {
     shows("tail_chain", Mechanism::TailChain);
+}
+
+/// The measure of the response: an activation begins when its request is set, also if the same handler runs at this time.
+#[test]
+fn a_request_while_the_handler_runs_waits_for_its_end() {
+    let mut bench = Bench::new("requested_again");
+    assert_eq!(bench.run(), Verdict::Passed);
+    let activity = *bench.machine.stats().of(Exception::irq(28));
+    assert_eq!((activity.entries, bench.machine.stats().tail_chained), (2, 1));
+    assert!(activity.worst_cycles < activity.cycles * 6 / 10, "the runs are two activations: {activity:?}");
+    let run = Time::of_cycle(16_000_000).0 * activity.worst_cycles;
+    let (latency, response) = (activity.worst_latency.0, activity.worst_response.0);
+    assert!((run * 9 / 10..=run * 11 / 10).contains(&latency), "{activity:?}");
+    assert!((run * 19 / 10..=run * 21 / 10).contains(&response), "{activity:?}");
 }
 
 #[test]

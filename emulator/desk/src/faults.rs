@@ -1,9 +1,11 @@
 //! Faults of hardware, each with the step that must be red and the words that it must say.
 
 use chip::Loss;
+use protect::OptionBytes;
 use sim::world::World;
 
 use crate::desk::{EmulatedDesk, Mistake};
+use crate::probe::Probe;
 
 /// How a fault comes into the world.
 #[derive(Clone, Copy)]
@@ -132,16 +134,10 @@ fn no_transducer(world: &mut World) {
     world.machine(0).peripherals_mut().plant_mut(now).rails.transducer = 0.0;
 }
 
-/// Read-out protection at level 1 (RM0390, 3.6.3).
+/// Read-out protection at level 1, programmed with the sequence of `cargo xtask protect`.
 fn protect(world: &mut World) {
-    const OPTKEYR: u32 = 0x4002_3C08;
-    const OPTCR: u32 = 0x4002_3C14;
-    let machine = world.machine(0);
-    for (register, value) in
-        [(OPTKEYR, 0x0819_2A3B), (OPTKEYR, 0x4C5D_6E7F), (OPTCR, 0x0FFF_55EC), (OPTCR, 0x0FFF_55EE)]
-    {
-        machine.debug_write(register, value);
-    }
+    // A probe that fails leaves the chip unprotected, and the step tells.
+    let _ = protect::program(&mut Probe(world), OptionBytes::FACTORY.with_read_out(true));
 }
 
 fn flip(world: &mut World, address: u32) {

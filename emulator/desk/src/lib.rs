@@ -11,16 +11,18 @@ use sim::world::World;
 
 mod adapter;
 mod desk;
+mod probe;
 pub mod faults;
 
 pub use adapter::{Adapter, Shared};
 pub use desk::{EmulatedDesk, Mistake};
+pub use probe::Probe;
 
-/// The images of a development board in this directory, on one board with an encoder.
+/// The images of a development board in this directory, on one board with this personality.
 ///
 /// # Errors
-/// The images or the flags are wrong.
-pub fn world(images: &Path, flags: &str) -> Result<World> {
+/// The images, the personality or the flags are wrong.
+pub fn world(images: &Path, personality: &str, flags: &str) -> Result<World> {
     let [bootloader, firmware] =
         ["bootloader", "firmware"].map(|name| images.join(name).display().to_string());
     let fixed = [
@@ -32,7 +34,7 @@ pub fn world(images: &Path, flags: &str) -> Result<World> {
         "--bitrate",
         "1000",
         "--node",
-        "1:encoder",
+        &format!("1:{personality}"),
     ];
     let fixed = fixed.into_iter().chain(["--pressure", "const:250000"]);
     let options = Options::try_parse_from(fixed.chain(flags.split_whitespace()))?;

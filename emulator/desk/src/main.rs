@@ -25,6 +25,9 @@ struct Cli {
     /// With this fault of the hardware, by its words; `list` prints all
     #[arg(long)]
     fault: Option<String>,
+    /// The personality of the board: pressure, encoder, combined or lift
+    #[arg(long, default_value = "encoder")]
+    personality: String,
     /// As long as with a board
     #[arg(long)]
     full: bool,
@@ -44,8 +47,8 @@ fn run(cli: &Cli) -> Result<report::Result> {
         found.with_context(|| format!("no fault is called {name:?}; `--fault list` prints all"))
     });
     let fault = fault.transpose()?;
-    let mut desk =
-        EmulatedDesk::new(world(&cli.images, fault.map_or("", |fault| fault.flags()))?, &cli.images)?;
+    let world = world(&cli.images, &cli.personality, fault.map_or("", |fault| fault.flags()))?;
+    let mut desk = EmulatedDesk::new(world, &cli.images)?;
     if let Some(fault) = fault {
         fault.bring(&mut desk);
     }

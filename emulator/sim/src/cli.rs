@@ -10,7 +10,7 @@ use clap::{Parser, ValueEnum};
 use emulator::Estimate;
 use storage::DeviceRecord;
 
-use crate::oscillator::Oscillator;
+use crate::oscillator::{Lsi, Oscillator};
 use crate::personality::Personality;
 use crate::stimuli::{Stimulus, Targeted};
 
@@ -119,6 +119,10 @@ pub struct Options {
     /// Mbit/s.
     #[arg(long, value_name = "[ID=]PPM", allow_negative_numbers = true)]
     pub oscillator: Vec<Targeted<Oscillator>>,
+
+    /// Frequency of the board's LSI in Hz, from which the watchdog counts.
+    #[arg(long, value_name = "[ID=]HERTZ")]
+    pub lsi: Vec<Targeted<Lsi>>,
 
     /// Load the bus with foreign frames of the lowest priority, in percent of its time.
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
@@ -271,7 +275,7 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
-             --reflash --interleave 7 --cycles worst --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --load 50 --json --socketcan vcan0 --no-page --control 127.0.0.1:0";
+             --reflash --interleave 7 --cycles worst --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --lsi 2=17000 --load 50 --json --socketcan vcan0 --no-page --control 127.0.0.1:0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));
@@ -308,6 +312,7 @@ mod tests {
             ("--temperature const:25", "temperatures are in K"),
             ("--pressure 1=nonsense", "nonsense"),
             ("--oscillator 1=30000", "20000 ppm"),
+            ("--lsi 10000", "17000 to 47000 Hz"),
             ("--speed warp", "real, max"),
             ("--wings", "--wings"),
         ];

@@ -1,5 +1,6 @@
-//! The error of a board's oscillator.
+//! The oscillators of a board: the error of the one at OSC_IN, and the frequency of the LSI.
 
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 /// Largest error in ppm: 2 %.
@@ -27,6 +28,31 @@ impl FromStr for Oscillator {
     }
 }
 
+/// The frequencies of the LSI in hertz (STM32F446 datasheet, LSI oscillator characteristics).
+const LSI: RangeInclusive<u32> = 17_000..=47_000;
+
+/// The frequency of a board's LSI, from which the watchdog counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lsi(u32);
+
+impl Lsi {
+    /// The frequency in hertz.
+    pub(crate) const fn hertz(self) -> u32 {
+        self.0
+    }
+}
+
+impl FromStr for Lsi {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Lsi, String> {
+        let hertz = text.parse().ok().filter(|hertz| LSI.contains(hertz));
+        hertz.map(Lsi).ok_or_else(|| {
+            format!("{text:?} is no frequency of an LSI: {} to {} Hz", LSI.start(), LSI.end())
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -40,6 +66,15 @@ mod tests {
         );
         for text in ["", "fast", "20001", "-20001", "99999999999"] {
             assert!(text.parse::<Oscillator>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_lsi_has_17_to_47_kilohertz() {
+        assert_eq!("17000".parse::<Lsi>().map(Lsi::hertz), Ok(17_000));
+        assert_eq!("47000".parse::<Lsi>().map(Lsi::hertz), Ok(47_000));
+        for text in ["", "16999", "47001", "32 kHz"] {
+            assert!(text.parse::<Lsi>().is_err(), "{text}");
         }
     }
 }

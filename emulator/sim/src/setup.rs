@@ -4,15 +4,16 @@ use std::ops::Range;
 use std::rc::Rc;
 
 use anyhow::{Context, Result, ensure};
-use bsp::boards::{Button, Chip, Pull};
-use chip::{Board as Wiring, ButtonPin, Stm32f4, Variant};
+use bsp::boards::{Button, Chip, Light, Pull};
+use chip::{Board as Wiring, ButtonPin, FrontEnd, Stm32f4, Variant};
 use storage::{DeviceRecord, Memory, Pages};
 
 use crate::board::{Board, Contents, Images};
 use crate::cli::{Node, Options, UNCONFIGURED};
 use crate::flash;
 use crate::image::Image;
-use crate::oscillator::Oscillator;
+use crate::oscillator::Lsi;
+use crate::stimuli::Targeted;
 use crate::world::World;
 
 /// The two pages of the parameter store: sectors 2 and 3 (memory.x).
@@ -42,15 +43,18 @@ pub fn world(options: &Options) -> Result<World> {
             .into_iter()
             .try_for_each(|board| world.machine(board).interleave(Some(seed + board as u64)))?;
     }
-    for oscillator in &options.oscillator {
-        ensure!(options.nodes.iter().any(|node| oscillator.is_for(node.id)), "an oscillator is for nobody");
-    }
+    ensure!(all_are_for_a_node(&options.oscillator, options), "an oscillator is for nobody");
+    ensure!(all_are_for_a_node(&options.lsi, options), "an LSI is for nobody");
     let Options { pressure, temperature, thermistor, supply, shaft, button, fault, .. } = options;
     let stimuli = [pressure, temperature, thermistor, supply, shaft, button, fault].into_iter().flatten();
     for stimulus in stimuli {
         world.apply(stimulus).context("a stimulus is for nobody")?;
     }
     Ok(world)
+}
+
+fn all_are_for_a_node<T>(values: &[Targeted<T>], options: &Options) -> bool {
+    values.iter().all(|value| options.nodes.iter().any(|node| value.is_for(node.id)))
 }
 
 fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
@@ -70,14 +74,22 @@ fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
 /// The chip of a board, with its clock and its own unique identifier, from which the firmware derives the serial
 /// number.
 fn chip(node: &Node, options: &Options) -> Stm32f4 {
-    let oscillator = oscillator(node, options);
+    let oscillator = own(&options.oscillator, node).unwrap_or_default();
     let board = image_board(options.chip);
     let buttons = board.buttons.map(|Button { pin, pull, pressed }| {
         // Without a resistor of the chip, the board has one.
         let released = (pull == Pull::None).then_some(!pressed);
         ButtonPin::new(pin.port, pin.number.into(), pressed, released)
     });
-    let mut wiring = Wiring { hse: oscillator.hertz(board.oscillator.hertz), buttons, ..Wiring::default() };
+    let Light { pin: standby, on } = board.standby;
+    let mut wiring = Wiring {
+        hse: oscillator.hertz(board.oscillator.hertz),
+        lsi: own(&options.lsi, node).map_or(Wiring::default().lsi, Lsi::hertz),
+        buttons,
+        front_end: front_end(&board.front_end),
+        standby: (standby.port, standby.number.into(), on),
+        ..Wiring::default()
+    };
     wiring.unique_id[0] = node.id.into();
     Stm32f4::new(options.chip, wiring)
 }
@@ -93,10 +105,24 @@ fn image_board(chip: Variant) -> bsp::boards::Board {
     found.map_or(*bsp::boards::ALL[0].1, |(_, board)| *board)
 }
 
-/// The last oscillator error on the command line that applies to the board.
-fn oscillator(node: &Node, options: &Options) -> Oscillator {
-    let own = options.oscillator.iter().rfind(|oscillator| oscillator.is_for(node.id));
-    own.map_or_else(Oscillator::default, |oscillator| oscillator.what)
+/// The front end as the emulated board takes it: volts and ratios.
+fn front_end(board: &bsp::boards::FrontEnd) -> FrontEnd {
+    let bsp::boards::FrontEnd { supply, divider, transducer, thermistor } = *board;
+    let permille = |value: u32| f64::from(value) / 1000.0;
+    FrontEnd {
+        supply: permille(supply),
+        divider: f64::from(divider.lower) / f64::from(divider.upper + divider.lower),
+        output: (permille(transducer.zero), permille(transducer.full)),
+        full_scale: transducer.range.into(),
+        thermistor: thermistor.ohms.into(),
+        beta: thermistor.beta.into(),
+        series: thermistor.series.into(),
+    }
+}
+
+/// The last value on the command line that applies to the board.
+fn own<T: Copy>(values: &[Targeted<T>], node: &Node) -> Option<T> {
+    values.iter().rfind(|value| value.is_for(node.id)).map(|value| value.what)
 }
 
 /// Writes the device record of a new board: one whose parameter pages are erased. The pages of another board stay as they

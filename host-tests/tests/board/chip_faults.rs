@@ -10,13 +10,13 @@ use crate::support::{Master, SECOND, comes_back, run, running, world};
 
 /// Timer 2, the time base: its counter (RM0390, 17.4.10) and its interrupt.
 const TIM2_CNT: u32 = 0x4000_0024;
-const TIM2: u32 = 28;
+pub(crate) const TIM2: u32 = 28;
 /// The interrupts of the services and of the sampling.
 const CAN1_SCE: u32 = 22;
 const DMA2_STREAM0: u32 = 56;
 /// The application's vector table (memory.x), an endless loop, and an undefined instruction.
 const VECTORS: u32 = 0x0802_0200;
-const BRANCH_TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
+pub(crate) const BRANCH_TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
 /// UDF #0.
 const UNDEFINED: [u8; 2] = [0x00, 0xDE];
 /// EMCY code for an unexpected reset (object 3000h:3, bit 6).
@@ -90,7 +90,7 @@ fn a_fault_in_a_task_ends_in_a_recorded_reset() {
 }
 
 /// Replaces the first instruction of a handler until a reset follows. Returns the address.
-fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
+pub(crate) fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
     let mut vector = [0; 4];
     world.machine(0).read(VECTORS + 4 * (16 + irq), &mut vector).unwrap();
     let handler = u32::from_le_bytes(vector) & !1;

@@ -17,11 +17,11 @@ const HEARTBEAT: (u16, u8) = (0x1017, 0);
 const LOST_MILLISECONDS: (u16, u8) = (0x2001, 2);
 const LOST_FRAMES: (u16, u8) = (0x2001, 1);
 const SAVES_LEFT: (u16, u8) = (0x2010, 1);
-const ERASES: (u16, u8) = (0x2010, 2);
+pub(crate) const ERASES: (u16, u8) = (0x2010, 2);
 const PRESET: (u16, u8) = (0x6003, 0);
 const POSITION: (u16, u8) = (0x6004, 0);
 const DEVICE_STATE: u32 = 0x0800_0022;
-const PRE_OPERATIONAL: [u8; 2] = [0x80, 1];
+pub(crate) const PRE_OPERATIONAL: [u8; 2] = [0x80, 1];
 /// The longest erase of a page, and what the save adds.
 const LONGEST_ANSWER: Time = Time::from_millis(600);
 
@@ -64,7 +64,7 @@ fn started(personality: &str, bit_rate: u32) -> (World, Master) {
 }
 
 /// A change and a save of all groups.
-fn save_change(world: &mut World, master: &Master, number: u32) -> (Result<(), u32>, Time) {
+pub(crate) fn save_change(world: &mut World, master: &Master, number: u32) -> (Result<(), u32>, Time) {
     write(world, master, COMMUNICATION, 4, number);
     write(world, master, APPLICATION, 2, number);
     store(world, master, ALL, SAVE)

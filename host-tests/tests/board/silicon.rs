@@ -6,8 +6,9 @@ use chip::Loss;
 use object::{Object, ObjectSection, ObjectSymbol};
 use sim::world::World;
 
-use crate::chip_faults::{peek, poke};
+use crate::chip_faults::{BRANCH_TO_ITSELF, TIM2, peek, poke, run_broken};
 use crate::encoder::{ALARMS, SENSOR_STATE, UNREFERENCED, cycle_power, start};
+use crate::room::{ERASES, PRE_OPERATIONAL, save_change};
 use crate::support::{Master, SECOND, images, read, run, running, world};
 
 /// RCC_AHB1ENR, the clocks of the ports; port A, and the distance of two ports (RM0390, 6.3.10 and table 1).
@@ -117,6 +118,41 @@ fn a_mailbox_that_is_released_late_costs_no_reset() {
     assert!(summary.nodes[0].incidents.is_empty(), "{summary}");
     assert_eq!(summary.nodes[0].heard.boot_ups, 1, "{summary}");
     assert!(read(&mut world, &master, LOST_FRAMES) > lost, "{summary}");
+}
+
+/// The oscillator of the watchdog has 17 to 47 kHz: within this range the watchdog ends a task that hangs after the same
+/// number of its cycles, also when the long time-out of an erase has been in force.
+#[test]
+fn the_watchdog_keeps_its_time_out_with_every_oscillator_and_after_an_erase() {
+    for lsi in [17_000, 32_000, 47_000] {
+        for erases in [0, 1] {
+            let mut world = world(&format!("--bitrate 1000 --lsi {lsi}"));
+            world.run_until(SECOND);
+            let master = Master::join(&mut world);
+            master.send(&mut world, 0, &PRE_OPERATIONAL);
+            let before = read(&mut world, &master, ERASES);
+            let is_done = |world: &mut World| read(world, &master, ERASES) >= before + erases;
+            for number in 1..100 {
+                if is_done(&mut world) {
+                    break;
+                }
+                let _ = save_change(&mut world, &master, number);
+                world.run_until(world.now() + Time::from_millis(50));
+            }
+            assert!(is_done(&mut world), "no page was erased");
+            world.run_until(world.now() + Time::from_millis(500));
+            assert!(world.machine(0).incidents().is_empty(), "{lsi} Hz: a reset by a save");
+            let begin = world.now();
+            run_broken(&mut world, TIM2, BRANCH_TO_ITSELF);
+            let seen = (world.now() - begin).as_secs_f64() * 1000.0;
+            let nominal = 200.0 * 32_000.0 / f64::from(lsi);
+            // The tasks report every 20 ms.
+            assert!(
+                (nominal - 25.0..nominal + 5.0).contains(&seen),
+                "{lsi} Hz, {erases} erases: {seen:.1} ms instead of {nominal:.1} ms"
+            );
+        }
+    }
 }
 
 /// Each wait for a flag of the hardware has a bound: no loop has a register in its condition, and a loop without a

@@ -1,9 +1,10 @@
 //! A supply that falls and rises, with the brown-out reset off and at each of its levels.
 
+use bringup_emulated::Probe;
 use canbus::Time;
+use protect::OptionBytes;
 use sim::world::World;
 
-use crate::chip_faults::{peek, poke};
 use crate::encoder::stimulate;
 use crate::support::{Master, SECOND, read, running, write};
 
@@ -12,14 +13,6 @@ const SAVED: (u16, u8) = (0x1017, 0);
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e'];
 /// 2001h:10.
 const REFUSED: (u16, u8) = (0x2001, 10);
-/// FLASH_OPTKEYR, its keys, and FLASH_OPTCR (RM0390, 3.8).
-const OPTKEYR: u32 = 0x4002_3C08;
-const OPTCR: u32 = 0x4002_3C14;
-const KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
-/// BOR_LEV and OPTSTRT in FLASH_OPTCR.
-const LEVEL: u32 = 0b11 << 2;
-const START: u32 = 1 << 1;
-
 /// Saves, and returns the response; empty without one.
 fn save(world: &mut World, master: &Master) -> Vec<u8> {
     master.heard(world, 0x581);
@@ -33,11 +26,9 @@ fn save(world: &mut World, master: &Master) -> Vec<u8> {
     Vec::new()
 }
 
-fn set_brown_out_level(world: &mut World, level: u32) {
-    KEYS.into_iter().for_each(|key| poke(world, OPTKEYR, key));
-    let options = peek(world, OPTCR) & !LEVEL | level << 2;
-    poke(world, OPTCR, options);
-    poke(world, OPTCR, options | START);
+fn set_brown_out_level(world: &mut World, level: u8) {
+    let options = OptionBytes::FACTORY.with_brown_out_level(level);
+    protect::program(&mut Probe(world), options).unwrap();
     world.run_until(world.now() + SECOND);
 }
 

@@ -181,3 +181,26 @@ fn a_damaged_calibration_is_an_emergency() {
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1, 0, 0, 0]), "the sensor is not set up as it should");
     assert_eq!(bench.read(0x1F57, 1), Ok(vec![3 << 1, 0, 0, 0]));
 }
+
+/// The default parameters are those of the front end that is in the file of each board.
+#[test]
+fn the_defaults_are_those_of_the_front_end_of_every_board() {
+    let mut bench = Bench::booted();
+    for (name, board) in bsp::boards::ALL {
+        let bsp::boards::FrontEnd { transducer, thermistor, .. } = board.front_end;
+        let expected = |value: u32| value as f32;
+        assert_eq!(real(&mut bench, 0x2200, 1), 0.0, "{name}");
+        assert_eq!(real(&mut bench, 0x2200, 2), expected(transducer.range), "{name}");
+        let zero = expected(transducer.zero) / 1000.0;
+        let span = expected(transducer.full - transducer.zero) / 1000.0;
+        assert!(is_close(real(&mut bench, 0x2200, 3), zero, 1e-6), "{name}");
+        assert!(is_close(real(&mut bench, 0x2200, 6), span, 1e-6), "{name}");
+        // 1/T = A + B ln(R): the coefficients of a resistance at 25 degC and a beta.
+        let b = 1.0 / expected(thermistor.beta);
+        let a = 1.0 / 298.15 - expected(thermistor.ohms).ln() * b;
+        assert!(is_close(real(&mut bench, 0x2201, 4), a, 1e-8), "{name}");
+        assert!(is_close(real(&mut bench, 0x2201, 5), b, 1e-9), "{name}");
+        assert_eq!(real(&mut bench, 0x2201, 6), 0.0, "{name}");
+        assert_eq!(real(&mut bench, 0x2201, 7), expected(thermistor.series), "{name}");
+    }
+}

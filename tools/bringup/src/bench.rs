@@ -11,6 +11,10 @@ use crate::chip::Chip;
 use crate::desk::{Action, Desk};
 use crate::report::{Check, Result as Outcome};
 use crate::run::Effort;
+use crate::values;
+
+/// The object with the values of the board.
+pub(crate) const SELF_TEST: u16 = 0x2005;
 
 /// The desk, and what a step has checked.
 pub struct Bench<'d> {
@@ -139,6 +143,15 @@ impl Bench<'_> {
     /// The node refuses it, or does not answer.
     pub fn set(&mut self, index: u16, sub: u8, value: &[u8]) -> Result<()> {
         self.client().download(at(index, sub), value, |_| ()).map_err(Into::into)
+    }
+
+    /// A value of the board in 2005h, through the bus.
+    ///
+    /// # Errors
+    /// The node does not answer.
+    pub fn self_test(&mut self, number: u8) -> Result<u32> {
+        self.set(SELF_TEST, 0, &values::selection(number))?;
+        self.object(SELF_TEST, 0)
     }
 
     fn client(&mut self) -> sdo::Client<'_> {

@@ -12,6 +12,7 @@ pub mod real;
 pub mod report;
 pub mod run;
 pub mod steps;
+pub mod values;
 
 pub use bench::Bench;
 pub use desk::{Action, Desk};

@@ -64,7 +64,14 @@ impl OptionBytes {
     /// The same option bytes with the brown-out reset at level 3 or off.
     #[must_use]
     pub fn with_brown_out(self, guards: bool) -> OptionBytes {
-        OptionBytes(if guards { self.0 & !BROWN_OUT } else { self.0 | BROWN_OUT })
+        self.with_brown_out_level(if guards { 3 } else { 0 })
+    }
+
+    /// The same option bytes with the brown-out reset at a level from 0, off, to 3, below 2.7 V.
+    #[must_use]
+    pub fn with_brown_out_level(self, level: u8) -> OptionBytes {
+        let bits = u32::from(level & 0b11) << BROWN_OUT.trailing_zeros();
+        OptionBytes((self.0 | BROWN_OUT) & !bits)
     }
 
     /// The level of the read-out protection.

@@ -1,7 +1,7 @@
 //! The black board with an `STM32F407VET6`, marked `STM32_F4VE V2.0`, with a crystal of 8 MHz (the device tree of Zephyr,
 //! `black_f407ve`). PA0 has the button `WK_UP` to the supply: do not press it. PB5 also goes to the input of a flash chip.
 
-use super::{Board, Button, Chip, Light, Oscillator, Pin, Pull};
+use super::{Board, Button, Chip, Light, Oscillator, Pin, Pull, front_end};
 
 pub(super) const BOARD: Board = Board {
     name: "STM32_F4VE V2.0",
@@ -16,4 +16,5 @@ pub(super) const BOARD: Board = Board {
     ],
     lamps: [Light { pin: Pin::new('C', 0), on: true }, Light { pin: Pin::new('C', 1), on: true }],
     standby: Light { pin: Pin::new('B', 12), on: true },
+    front_end: front_end::DEFAULT,
 };

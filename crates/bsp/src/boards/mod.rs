@@ -4,8 +4,11 @@
 //! of the peripherals and the same on all boards. docs/extending.md says how a board is added.
 
 mod black_f407ve;
+mod front_end;
 mod nucleo_f446re;
 mod weact_f405rg;
+
+pub use front_end::{Divider, FrontEnd, Thermistor, Transducer};
 
 /// The boards that images can be built for, by the name of their feature.
 pub const ALL: [(&str, &Board); 3] = [
@@ -42,6 +45,8 @@ pub struct Board {
     /// The pin that puts the CAN transceiver to sleep (STB, RS or S), with the level that does. Without such a pin, one
     /// that is not connected.
     pub standby: Light,
+    /// The circuits of the analogue inputs.
+    pub front_end: FrontEnd,
 }
 
 /// A chip.
@@ -171,6 +176,17 @@ mod tests {
             let of_all: u32 = ('A'..='H').map(|port| fixed(port).count_ones()).sum();
             assert_eq!(of_ports, of_all + 6, "{feature}");
         }
+    }
+
+    /// VDDA is 3.3 V; an input has the whole of it at most.
+    #[test]
+    fn no_input_is_above_vdda() {
+        for (feature, board) in ALL {
+            assert!(board.front_end.highest_input() <= 3300, "{feature}: {:?}", board.front_end);
+        }
+        let direct = Divider { upper: 0, lower: 15_000 };
+        let wrong = FrontEnd { divider: direct, ..ALL[0].1.front_end };
+        assert_eq!(wrong.highest_input(), 5000);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! NUCLEO-F446RE (UM1724): the default. The ST-LINK feeds its clock into `OSC_IN`.
 
-use super::{Board, Button, Chip, Light, Oscillator, Pin, Pull};
+use super::{Board, Button, Chip, Light, Oscillator, Pin, Pull, front_end};
 
 pub(super) const BOARD: Board = Board {
     name: "NUCLEO-F446RE",
@@ -15,4 +15,5 @@ pub(super) const BOARD: Board = Board {
     ],
     lamps: [Light { pin: Pin::new('C', 0), on: true }, Light { pin: Pin::new('C', 1), on: true }],
     standby: Light { pin: Pin::new('B', 12), on: true },
+    front_end: front_end::DEFAULT,
 };

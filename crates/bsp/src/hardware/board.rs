@@ -1,5 +1,7 @@
 //! Bring-up of the whole board in one place: clocks, pins, and the owner of each peripheral.
 
+use core::sync::atomic::Ordering;
+
 use stm32f4xx_hal::dma::StreamsTuple;
 use stm32f4xx_hal::pac::{FLASH, Peripherals, RCC};
 use stm32f4xx_hal::prelude::*;
@@ -10,6 +12,7 @@ use super::digital::{Buttons, Lamps};
 use super::flash::Flash;
 use super::front_end::FrontEnd;
 use super::led::Led;
+use super::self_test::SEEN;
 use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
@@ -117,7 +120,9 @@ impl Board {
 
 /// Reads and clears the flags, so that the next reset shows only its own cause.
 fn reset_cause(rcc: &RCC) -> ResetCause {
-    let cause = ResetCause::from_csr(rcc.csr().read().bits());
+    let flags = rcc.csr().read().bits();
+    SEEN.reset_flags.store(flags, Ordering::Relaxed);
+    let cause = ResetCause::from_csr(flags);
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     cause
 }

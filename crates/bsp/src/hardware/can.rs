@@ -81,7 +81,7 @@ impl Controller {
         });
         self.set_filters(banks);
         self.enable_interrupts();
-        self.mark_error_code();
+        mark_error_code();
         // The controller joins after 11 recessive bits. The automatic return from bus-off is off: `crate::back_off`
         // decides on the return.
         registers().mcr().modify(|_, w| w.abom().clear_bit().sleep().clear_bit().inrq().clear_bit());
@@ -116,7 +116,7 @@ impl Controller {
     pub fn heard(&mut self) -> Heard {
         acknowledge_error();
         let code = registers().esr().read().lec().bits();
-        self.mark_error_code();
+        mark_error_code();
         match code {
             NO_ERROR => Heard::Frame,
             UNTOUCHED => Heard::Silence,
@@ -128,12 +128,6 @@ impl Controller {
     /// Makes every error raise the error interrupt, until the next start.
     pub fn watch_errors(&mut self) {
         registers().ier().modify(|_, w| w.lecie().set_bit());
-    }
-
-    /// Sets LEC to a value that the hardware never sets, so that any other value is new (RM0390, 30.9.2, LEC).
-    fn mark_error_code(&mut self) {
-        // SAFETY: LEC takes any value.
-        registers().esr().modify(|_, w| unsafe { w.lec().bits(UNTOUCHED) });
     }
 
     /// Replaces the filters. Frames that end during the change, a few microseconds, are not received. CAN1 owns all
@@ -211,6 +205,12 @@ fn is_initialising() -> bool {
             return false;
         }
     }
+}
+
+/// Sets LEC to a value that the hardware never sets, so that any other value is new (RM0390, 30.9.2, LEC).
+pub(super) fn mark_error_code() {
+    // SAFETY: LEC takes any value.
+    registers().esr().modify(|_, w| unsafe { w.lec().bits(UNTOUCHED) });
 }
 
 /// Acknowledges the error interrupt, which is raised again until then. The error code can still be read afterwards.

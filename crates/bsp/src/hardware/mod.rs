@@ -24,6 +24,7 @@ mod program_flash;
 mod receive;
 pub mod retained;
 mod sampling;
+pub mod self_test;
 mod ssi;
 mod stream;
 mod time_base;

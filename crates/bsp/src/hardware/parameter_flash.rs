@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
 use super::flash::{Error, Flash};
-use super::{backup, memory};
+use super::{backup, memory, self_test};
 use crate::flash_area::FlashArea;
 use crate::losses::{Event, Losses};
 use crate::sectors;
@@ -76,7 +76,7 @@ impl NorFlash for ParameterFlash {
         self.admit()?;
         for address in (start..start + len).step_by(Self::ERASE_SIZE) {
             let sector = sectors::starting_at(address).ok_or(NorFlashErrorKind::NotAligned)?;
-            let erased = self.flash.erase(sector.number);
+            let erased = self_test::timed(|| self.flash.erase(sector.number));
             self.noted(erased)?;
         }
         self.flash.forget_cached();

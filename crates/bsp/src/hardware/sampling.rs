@@ -46,10 +46,12 @@ struct SamplingTime {
     cycles: u32,
 }
 
-/// 28 cycles are enough for a source below 15 kohm; 480 cycles give the internal sensors the necessary 10 us (STM32F446
+/// 28 cycles are enough for a source of up to 15 kohm; 480 cycles give the internal sensors the necessary 10 us (STM32F446
 /// datasheet, 6.3.22 to 6.3.24).
 const EXTERNAL: SamplingTime = SamplingTime { code: 2, cycles: 28 };
 const INTERNAL: SamplingTime = SamplingTime { code: 7, cycles: 480 };
+/// The highest source resistance for `EXTERNAL` in ohms.
+const HIGHEST_SOURCE: u32 = 15_000;
 /// Cycles of the successive approximation, 12 bits.
 const APPROXIMATION: u32 = 12;
 
@@ -61,6 +63,7 @@ const _: () = {
     }
     // The ADC runs at a quarter of APB2, which is the clock of TIM3: both 72 MHz.
     assert!(scan * 4 < PERIOD as u32, "a scan must end before the next begins");
+    assert!(BOARD.front_end.source_resistance() <= HIGHEST_SOURCE, "an input settles while it is sampled");
     assert!(SCANS as u32 * PERIOD as u32 == 72_000, "the interrupt must come once a millisecond");
 };
 
@@ -70,6 +73,9 @@ const STOP_POLLS: u32 = 1_000;
 /// Written by the DMA controller and read by the core, two conversions in a word. Atomic, because two bus masters share
 /// the memory.
 static BUFFER: [AtomicU32; 2 * WORDS] = [const { AtomicU32::new(0) }; 2 * WORDS];
+
+/// The conversions, for the self-test.
+pub(super) const CONVERSIONS: *const u32 = &raw const BUFFER as *const u32;
 
 /// Sums over the scans of one millisecond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

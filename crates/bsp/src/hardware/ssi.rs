@@ -49,7 +49,14 @@ const _: () = {
 };
 
 /// Written by DMA1 and read by the core. Atomic, because two bus masters share the memory.
-static RECEIVED: [AtomicU8; LONGEST as usize / 8] = [const { AtomicU8::new(0) }; LONGEST as usize / 8];
+static WORD: Aligned = Aligned([const { AtomicU8::new(0) }; LONGEST as usize / 8]);
+
+/// Bytes that can be read as words.
+#[repr(C, align(4))]
+struct Aligned([AtomicU8; LONGEST as usize / 8]);
+
+/// The bytes of the last word, for the self-test.
+pub(super) const RECEIVED: *const u32 = &raw const WORD as *const u32;
 /// The byte sent for each received byte; the output has no pin.
 static SENT: AtomicU8 = AtomicU8::new(0);
 
@@ -117,7 +124,7 @@ impl Ssi {
         self.send.clear_all_flags();
         self.receive.set_number_of_transfers(self.started as u16);
         self.send.set_number_of_transfers(self.started as u16);
-        // SAFETY: RECEIVED has as many bytes as the longest word, and SENT is read repeatedly.
+        // SAFETY: WORD has as many bytes as the longest word, and SENT is read repeatedly.
         unsafe {
             self.receive.enable();
             self.send.enable();
@@ -129,13 +136,13 @@ impl Ssi {
         stream::stop(&mut self.send);
         stream::stop(&mut self.receive);
         prepare_spi(&self.spi);
-        prepare(&mut self.receive, &self.spi, DmaDirection::PeripheralToMemory, &RECEIVED);
+        prepare(&mut self.receive, &self.spi, DmaDirection::PeripheralToMemory, &WORD.0);
         prepare(&mut self.send, &self.spi, DmaDirection::MemoryToPeripheral, core::slice::from_ref(&SENT));
     }
 }
 
 fn received(count: usize) -> SsiWord {
-    pack(RECEIVED.iter().take(count).map(|byte| byte.load(Ordering::Relaxed)))
+    pack(WORD.0.iter().take(count).map(|byte| byte.load(Ordering::Relaxed)))
 }
 
 /// SPI2 as a master with a clock that rests high, bytes with the highest bit first (RM0390, 26.3.5). Unread data is

@@ -115,3 +115,14 @@ pub const PARAMETER_MEMORY_ROWS: &[Object] = &[
     memory(2, "Page erases", Type::Unsigned16),
     memory(3, "Page erases allowed", Type::Unsigned8),
 ];
+
+/// Index of the object that shows values of the board.
+pub const SELF_TEST: u16 = 0x2005;
+
+/// The upper three bytes of a value of 2005h that selects a value of the board: "tes".
+pub const SELF_TEST_KEY: u32 = u32::from_be_bytes(*b"\0tes");
+
+/// 2005h: the key with a number in the lowest byte; an upload after that has the value of the board with this number.
+/// docs/board.md has the numbers.
+pub const SELF_TEST_ROW: Object =
+    Object::new(SELF_TEST, 0, "Self-test", Type::Unsigned32, Access::ReadWrite);

@@ -11,10 +11,12 @@ mod table;
 
 use canbus::Time;
 
+use crate::board::Board;
+
 use button::Button;
 pub use button::{BUTTONS, Push, PushError};
 pub use fault::{Fault, FaultError, FaultKind, FaultSwitch};
-pub use front_end::{FULL_SCALE, Rails};
+pub use front_end::{FrontEnd, Rails};
 pub use shaft::Motion;
 use shaft::Shaft;
 pub(crate) use shaft::first_change;
@@ -36,24 +38,26 @@ pub struct Plant {
     shaft: Shaft,
     buttons: [Button; BUTTONS],
     faults: Vec<Fault>,
+    front_end: FrontEnd,
     /// Supplies of the board.
     pub rails: Rails,
 }
 
 impl Plant {
-    /// No pressure, 25 degrees Celsius everywhere, a supply of 3.3 V, the shaft at rest at 0, an encoder with `encoder_lines` lines, no
-    /// button pressed.
-    pub(crate) fn new(encoder_lines: u32) -> Self {
+    /// The world of a board: no pressure, 25 degrees Celsius everywhere, a supply of 3.3 V, the shaft at rest at 0, no button
+    /// pressed.
+    pub(crate) fn new(board: &Board) -> Self {
         let still = |value| Stimulus::new(Signal::Constant(value), Time::ZERO);
         Self {
             pressure: still(0.0),
             temperature: still(298.15),
             thermistor: still(298.15),
             supply: still(SUPPLY),
-            shaft: Shaft::new(encoder_lines),
+            shaft: Shaft::new(board.encoder_lines),
             buttons: [Button::default(); BUTTONS],
             faults: Vec::new(),
-            rails: Rails::default(),
+            front_end: board.front_end,
+            rails: Rails::new(&board.front_end),
         }
     }
 
@@ -174,14 +178,14 @@ impl Plant {
         } else if self.has(FaultKind::RailLow, now) || self.has(FaultKind::OpenSensor, now) {
             0.0
         } else {
-            front_end::transducer(self.pressure(now))
+            self.front_end.transducer(self.pressure(now))
         };
-        self.rails.transducer_ratio(output)
+        self.front_end.output_ratio(output, self.rails)
     }
 
     /// PA1 as a ratio of VDDA.
     pub(crate) fn supply_input(&self) -> f64 {
-        self.rails.supply_ratio()
+        self.front_end.supply_ratio(self.rails)
     }
 
     /// PC2 as a ratio of VDDA.
@@ -191,7 +195,7 @@ impl Plant {
         } else if self.has(FaultKind::ShortedThermistor, now) {
             0.0
         } else {
-            front_end::thermistor(self.thermistor.at(now))
+            self.front_end.thermistor(self.thermistor.at(now))
         }
     }
 

@@ -30,6 +30,8 @@ struct Program {
     backup_writable: bool,
     port_b_clock: bool,
     can_function: u32,
+    /// The level of the pin that puts the transceiver to sleep.
+    standby: u32,
     bit_timing: u32,
     sample_times: u32,
     adc_prescaler: u32,
@@ -49,6 +51,7 @@ const RIGHT: Program = Program {
     backup_writable: true,
     port_b_clock: true,
     can_function: 9,
+    standby: 0,
     bit_timing: TIMING,
     sample_times: LONG,
     adc_prescaler: 0b01,
@@ -86,7 +89,8 @@ impl Program {
     }
 
     fn join(&self, rig: &mut Rig) {
-        rig.write(GPIOB, 0b1010 << 16 | 0x280);
+        rig.write(GPIOB + 0x14, self.standby << 12);
+        rig.write(GPIOB, 0b01 << 24 | 0b1010 << 16 | 0x280);
         rig.write(GPIOB + 0x24, self.can_function * 0x11);
         rig.write(CAN1, 1);
         rig.write(CAN1 + 0x1C, self.bit_timing);
@@ -148,6 +152,7 @@ fn every_seeded_bug_is_told() {
             Program { pll: pll(4, 180), wait_states: 5, ..RIGHT },
             "HCLK at 180000000 Hz",
         ),
+        ("a transceiver that sleeps", Program { standby: 1, ..RIGHT }, "transceiver asleep: PB12"),
         ("CAN on AF8", Program { can_function: 8, ..RIGHT }, "PB8 is not switched to CAN1_RX"),
         (
             "port B without its clock",

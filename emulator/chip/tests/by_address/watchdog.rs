@@ -1,7 +1,7 @@
 //! The independent watchdog, IWDG.
 
 use canbus::Time;
-use chip::{Effect, Peripherals};
+use chip::{Board, Effect, Peripherals, Stm32f4, Variant};
 
 use crate::support::{RCC, Rig};
 
@@ -81,4 +81,45 @@ fn its_registers_are_locked_without_the_key() {
     rig.write(KR, 0xAAAA);
     rig.write(RLR, 1);
     assert_eq!(rig.read(RLR), 0xFFF, "any other key locks again");
+}
+
+/// A chip whose LSI has this frequency.
+fn with_lsi(lsi: u32) -> Rig {
+    let mut rig = Rig::new();
+    rig.chip = Stm32f4::new(Variant::F446, Board { lsi, ..Board::default() });
+    rig
+}
+
+#[test]
+fn each_chip_has_an_lsi_of_its_own() {
+    for (lsi, least) in [(17_000, 188_200), (32_000, 100_000), (47_000, 68_000)] {
+        let mut rig = with_lsi(lsi);
+        start(&mut rig);
+        let fed = rig.now;
+        rig.run_to(fed + Time::from_micros(least - 100));
+        assert!(!rig.effects.contains(&Effect::Reset), "{lsi} Hz");
+        rig.run_to(fed + Time::from_micros(least + 200));
+        assert!(rig.effects.contains(&Effect::Reset), "{lsi} Hz");
+    }
+}
+
+/// While RVU is set, a reload takes the value before; while PVU is set, the count goes on with the prescaler before.
+#[test]
+fn a_new_value_has_no_effect_before_its_update() {
+    let mut rig = Rig::new();
+    start(&mut rig);
+    rig.write(KR, 0x5555);
+    rig.write(RLR, 9);
+    rig.write(KR, 0xAAAA);
+    let fed = rig.now;
+    rig.run_to(fed + Time::from_millis(99));
+    assert!(!rig.effects.contains(&Effect::Reset), "the reload took the old value: 100 ms");
+    rig.write(KR, 0xAAAA);
+    let fed = rig.now;
+    rig.write(KR, 0x5555);
+    rig.write(PR, 0);
+    rig.run_to(fed + Time(Time::from_micros(156).0 + Time::from_micros(1234).0));
+    assert!(!rig.effects.contains(&Effect::Reset), "10 ticks of 125 us after the update");
+    rig.run_to(fed + Time::from_micros(1410));
+    assert!(rig.effects.contains(&Effect::Reset));
 }

@@ -7,7 +7,7 @@ use canopen::lss::BitRate;
 use nodectl::lss::{Master, Selection};
 
 use crate::bench::Bench;
-use crate::chip;
+use crate::{chip, values};
 use crate::desk::Action;
 
 /// All bit rates of the node, in kbit/s.
@@ -164,6 +164,21 @@ pub(super) fn short_circuit(bench: &mut Bench<'_>) -> Result<()> {
         "yes",
         answer.is_ok(),
         "The node does not return from bus-off: read the log",
+    );
+    let peaks = bench.self_test(values::PEAKS)?;
+    let errors: Vec<u32> =
+        (0..6).map(|kind| bench.self_test(values::ERRORS + kind)).collect::<Result<_>>()?;
+    bench.remark(
+        "highest error counters, sent and received (2005h)",
+        format!("{} and {}", peaks & 0xFFFF, peaks >> 16),
+        "0 in a release",
+        "",
+    );
+    bench.remark(
+        "stuff, form, acknowledge, recessive bit, dominant bit, CRC errors (2005h)",
+        format!("{errors:?}"),
+        "0 in a release",
+        "",
     );
     let lines = bench.desk.log(Duration::from_millis(100))?;
     let is_told = lines.iter().any(|line| line.contains("bus-off") || line.contains("error passive"));

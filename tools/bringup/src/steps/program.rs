@@ -8,11 +8,16 @@ use nodectl::sdo;
 use nodectl::update::{Options, Step, Watcher, update as update_nodes};
 
 use super::sensors::lost_events;
-use crate::bench::Bench;
+use crate::bench::{Bench, SELF_TEST};
+use crate::values::{self, COMMANDS};
 
 /// A value without effect on the measurement: the heartbeat time.
 const SAVED: (u16, u8) = (0x1017, 0);
 const SAVE: (u16, u8) = (0x1010, 2);
+/// The longest erase of 16 KiB in microseconds (STM32F446 datasheet, flash memory programming).
+const LONGEST_ERASE: u32 = 500_000;
+/// The time after a start at which a crash no longer counts, and some more.
+const FORGIVEN: Duration = Duration::from_millis(11_000);
 
 pub(super) fn saves(bench: &mut Bench<'_>) -> Result<()> {
     let node = bench.node;
@@ -33,6 +38,14 @@ pub(super) fn saves(bench: &mut Bench<'_>) -> Result<()> {
         value,
         found == u32::from(value),
         "Read the log for \"not stored\", 2001h:8 and 2001h:10",
+    );
+    let erase = bench.self_test(values::LONGEST_ERASE)?;
+    bench.check(
+        "longest erase of a parameter page (2005h)",
+        format!("{erase} us"),
+        "500000 us at most; 0 in a release, and when no page was erased",
+        erase <= LONGEST_ERASE,
+        "The flash is slower than its data sheet: a low supply, or a chip at the end of its life",
     );
     lost_events(bench)
 }
@@ -69,7 +82,33 @@ pub(super) fn update(bench: &mut Bench<'_>) -> Result<()> {
             "The bootloader keeps the old program: `nodectl info` shows which one runs; see docs/update.md",
         );
     }
-    lost_events(bench)
+    lost_events(bench)?;
+    crashes(bench)
+}
+
+/// A program that hangs, faults, overflows its stack or panics starts again, and its log names the end of the last run.
+fn crashes(bench: &mut Bench<'_>) -> Result<()> {
+    for (command, what, words) in COMMANDS {
+        // Until the last crash is forgiven: the third one in a row would keep the bootloader.
+        bench.wait(FORGIVEN)?;
+        bench.desk.log(Duration::from_millis(10))?;
+        bench.set(SELF_TEST, 0, &values::selection(command))?;
+        if bench.object(SELF_TEST, 0).is_ok() {
+            bench.remark(what, "ignored", words, "The images are no development images");
+            return Ok(());
+        }
+        bench.answers_within(Duration::from_millis(5000))?;
+        let lines = bench.desk.log(Duration::from_millis(100))?;
+        let seen = lines.iter().find(|line| line.contains(words));
+        bench.check(
+            &format!("the log after a {what}"),
+            seen.map_or("nothing", String::as_str),
+            words,
+            seen.is_some(),
+            "The record in RAM is lost: the supply has failed at the reset, or a debugger has cleared the RAM",
+        );
+    }
+    Ok(())
 }
 
 /// Nobody watches the progress.

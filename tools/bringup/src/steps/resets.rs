@@ -7,7 +7,7 @@ use canopen::{Duration, Instant};
 use nodectl::nmt;
 
 use crate::bench::Bench;
-use crate::chip;
+use crate::{chip, values};
 use crate::desk::Action;
 
 /// The longest time from a reset to the boot-up message.
@@ -39,6 +39,9 @@ pub(super) fn causes(bench: &mut Bench<'_>) -> Result<()> {
             cause(bench, &format!("{seconds} s without supply"), "power on")?;
         }
     }
+    let (flags, tries) = (bench.self_test(values::RESET_FLAGS)?, bench.self_test(values::CLOCK_TRIES)?);
+    bench.remark("RCC_CSR at the last start (2005h)", format!("{flags:08X}h"), "", "");
+    bench.remark("resets without a clock on OSC_IN (2005h)", tries & 0xFFFF, "0; some with an ST-LINK", "");
     let first = bench.object(0x1003, 0)?;
     bench.check(
         "errors in 1003h after the last start",

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use canopen::Duration;
 
 use crate::bench::Bench;
-use crate::chip;
+use crate::{chip, values};
 use crate::desk::Action;
 
 /// The channels of a scan, in their order in the buffer.
@@ -13,6 +13,8 @@ pub(super) const SUPPLY: usize = 1;
 pub(super) const TEMPERATURE: usize = 3;
 pub(super) const REFERENCE: usize = 4;
 const CHANNELS: usize = 5;
+/// FLASH_ACR: PRFTEN.
+const PREFETCH: u32 = 1 << 8;
 /// Conversions in the buffer: two milliseconds of 16 scans, two conversions in a word.
 const WORDS: usize = 2 * 16 * CHANNELS / 2;
 /// Noise of an input, standard deviation in codes.
@@ -71,6 +73,7 @@ pub(super) fn analogue(bench: &mut Bench<'_>) -> Result<()> {
             "At a rail: a broken or shorted wire, or the divider is missing (docs/board.md, Pressure transducer)",
         );
     }
+    noise_without_prefetch(bench)?;
     let temperature = temperature(bench)?;
     bench.check_range(
         "temperature of the chip",
@@ -95,6 +98,22 @@ pub(super) fn analogue(bench: &mut Bench<'_>) -> Result<()> {
     }
     bench.by_hand(Action::Transducer)?;
     lost_events(bench)
+}
+
+/// The noise of the pressure without prefetch: it disturbs the converter on some boards (AN4073). The better setting is for
+/// whoever builds the product.
+fn noise_without_prefetch(bench: &mut Bench<'_>) -> Result<()> {
+    let settings = bench.word(chip::FLASH_ACR)?;
+    bench.desk.write(chip::FLASH_ACR, settings & !PREFETCH)?;
+    let quiet = channel(bench, PRESSURE)?.sigma;
+    bench.desk.write(chip::FLASH_ACR, settings)?;
+    bench.remark("noise of pressure (PA0) without prefetch", format!("{quiet:.2} codes"), "no less than with it", "");
+    Ok(())
+}
+
+/// The first eight bytes of the SSI word.
+fn raw_word(bench: &mut Bench<'_>) -> Result<[u32; 2]> {
+    Ok([bench.self_test(values::SSI_WORD)?, bench.self_test(values::SSI_WORD + 1)?])
 }
 
 /// The temperature of the chip in degC, by its calibration at 3.3 V.
@@ -136,13 +155,12 @@ pub(super) fn lost_events(bench: &mut Bench<'_>) -> Result<()> {
 }
 
 pub(super) fn encoder(bench: &mut Bench<'_>) -> Result<()> {
-    let device = bench.object(0x1000, 0)? & 0xFFFF;
-    if device != 0x0196 {
+    if bench.object(0x6501, 0).is_err() {
         bench.remark(
-            "device type",
-            format!("{device:04X}h"),
-            "0196h, an encoder",
-            "Choose the personality encoder (2000h) for this step",
+            "an encoder",
+            "none: 6501h does not exist",
+            "the profile of an encoder",
+            "Choose the personality encoder or combined (2000h) for this step",
         );
         return Ok(());
     }
@@ -181,6 +199,13 @@ fn rest(bench: &mut Bench<'_>) -> Result<()> {
     for _ in 0..bench.effort.frames {
         toggled |= bench.object(0x6004, 0)? ^ first;
     }
+    let word = raw_word(bench)?;
+    let mut raw = [0; 2];
+    for _ in 0..bench.effort.frames {
+        let again = raw_word(bench)?;
+        raw = [raw[0] | again[0] ^ word[0], raw[1] | again[1] ^ word[1]];
+    }
+    bench.remark("bits of the raw SSI word that toggle (2005h)", format!("{raw:08X?}"), "the lowest ones", "");
     let state = bench.object(0x210B, 1)?;
     bench.check(
         "bits that toggle at rest",

@@ -5,7 +5,7 @@ use canopen::Duration;
 use canopen::client::heartbeat::Heartbeat;
 
 use crate::bench::Bench;
-use crate::chip;
+use crate::{chip, values};
 
 /// The calibration of the references was made at this supply (STM32F446 datasheet, 6.3.24).
 const CALIBRATED_AT: f64 = 3.3;
@@ -86,7 +86,29 @@ pub(super) fn identity(bench: &mut Bench<'_>) -> Result<()> {
         low < high && high < 4096,
         "The chip is not calibrated: its temperature is not usable",
     );
-    option_bytes(bench)
+    option_bytes(bench)?;
+    self_test(bench)
+}
+
+/// The node itself reads the same as the probe: a board without a probe can be asked over the bus.
+fn self_test(bench: &mut Bench<'_>) -> Result<()> {
+    for (what, number, address) in [
+        ("DBGMCU_IDCODE", values::IDCODE, chip::IDCODE),
+        ("RCC_PLLCFGR", values::RCC + 1, chip::RCC + 4),
+        ("FLASH_ACR", values::FLASH_ACR, chip::FLASH_ACR),
+        ("FLASH_OPTCR", values::FLASH_OPTCR, chip::FLASH_OPTCR),
+        ("VREFIN_CAL", values::CALIBRATION, chip::REFERENCE_CALIBRATION),
+    ] {
+        let (seen, expected) = (bench.self_test(number)?, bench.word(address)?);
+        bench.check(
+            &format!("{what} over the bus (2005h)"),
+            format!("{seen:08X}h"),
+            format!("{expected:08X}h"),
+            seen == expected,
+            "The images are older than this tool: flash again",
+        );
+    }
+    Ok(())
 }
 
 fn option_bytes(bench: &mut Bench<'_>) -> Result<()> {

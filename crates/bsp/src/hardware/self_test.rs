@@ -1,0 +1,141 @@
+//! Values of the board for its bring-up (2005h), each a word at a fixed address.
+//!
+//! With the feature `development` the program also counts errors of the bus, measures the erase, and has the commands that
+//! break it. A release shows zeros there.
+
+use core::sync::atomic::AtomicU32;
+
+use stm32f4xx_hal::pac::{CAN1, DBGMCU, FLASH, GPIOA, GPIOB, GPIOC, PWR, RCC};
+
+use super::{retained, sampling, ssi};
+use crate::oversampling::WORDS;
+
+/// What the program has seen since its start. Written by one task each.
+pub(super) static SEEN: Seen = Seen {
+    reset_flags: AtomicU32::new(0),
+    peaks: AtomicU32::new(0),
+    errors: [const { AtomicU32::new(0) }; ERRORS],
+    longest_erase: AtomicU32::new(0),
+};
+
+/// Kinds of errors in LEC: stuff, form, acknowledge, recessive bit, dominant bit, CRC (RM0390, 30.9.2).
+const ERRORS: usize = 6;
+
+/// The words, in the order of their numbers.
+#[repr(C)]
+pub(super) struct Seen {
+    /// RCC_CSR at the start.
+    pub(super) reset_flags: AtomicU32,
+    /// The highest transmit error counter in the lower half, and the highest receive error counter in the upper half.
+    peaks: AtomicU32,
+    /// How often the last error code was each of the errors; looked at every 20 ms.
+    errors: [AtomicU32; ERRORS],
+    /// The longest erase of a parameter page in microseconds.
+    longest_erase: AtomicU32,
+}
+
+/// A block of words: its address and its length.
+type Block = (*const u32, u8);
+
+/// The values, by number from 0.
+const BLOCKS: [Block; 14] = [
+    (DBGMCU::ptr().cast(), 1),
+    // RCC_CR, RCC_PLLCFGR, RCC_CFGR.
+    (RCC::ptr().cast(), 3),
+    (FLASH::ptr().cast(), 1),
+    // FLASH_OPTCR.
+    (FLASH::ptr().cast::<u32>().wrapping_add(5), 1),
+    // PWR_CSR.
+    (PWR::ptr().cast::<u32>().wrapping_add(1), 1),
+    // GPIOx_IDR.
+    (GPIOA::ptr().cast::<u32>().wrapping_add(4), 1),
+    (GPIOB::ptr().cast::<u32>().wrapping_add(4), 1),
+    (GPIOC::ptr().cast::<u32>().wrapping_add(4), 1),
+    // CAN_ESR.
+    (CAN1::ptr().cast::<u32>().wrapping_add(6), 1),
+    // VREFIN_CAL in the upper half; TS_CAL1 and TS_CAL2.
+    (0x1FFF_7A28 as *const u32, 2),
+    (&raw const SEEN as *const u32, (size_of::<Seen>() / 4) as u8),
+    (retained::CLOCK_TRIES, 1),
+    // Bytes 0 to 7 of the last SSI word.
+    (ssi::RECEIVED, 2),
+    // The conversions of two milliseconds, two in a word.
+    (sampling::CONVERSIONS, 2 * WORDS as u8),
+];
+
+/// The value with this number; 0 without one. A command breaks the program.
+#[inline(never)]
+pub fn value(number: u8) -> u32 {
+    #[cfg(feature = "development")]
+    development::obey(number);
+    let mut place = number;
+    for (address, words) in BLOCKS {
+        if place < words {
+            // SAFETY: registers whose load has no effect, constants in flash, and statics, all aligned to words.
+            return unsafe { address.add(place.into()).read_volatile() };
+        }
+        place -= words;
+    }
+    0
+}
+
+/// Takes note of the error counters and of the last error on the bus. To be called every 20 ms.
+pub fn note_bus() {
+    #[cfg(feature = "development")]
+    development::note_bus();
+}
+
+/// Erases, and takes note of the time.
+pub(super) fn timed<R>(erase: impl FnOnce() -> R) -> R {
+    #[cfg(feature = "development")]
+    let begin = super::Clock::now();
+    let result = erase();
+    #[cfg(feature = "development")]
+    development::note_erase(super::Clock::now().0 - begin.0);
+    result
+}
+
+#[cfg(feature = "development")]
+mod development {
+    use core::arch::asm;
+    use core::sync::atomic::Ordering;
+
+    use super::SEEN;
+    use crate::hardware::{can, crash};
+
+    /// The commands, above all values.
+    const HANG: u8 = 0xF0;
+    const FAULT: u8 = 0xF1;
+    const OVERFLOW: u8 = 0xF2;
+    const PANIC: u8 = 0xF3;
+
+    pub(super) fn obey(command: u8) {
+        match command {
+            HANG => loop {
+                core::hint::spin_loop();
+            },
+            FAULT => cortex_m::asm::udf(),
+            // SAFETY: the program ends here.
+            OVERFLOW => unsafe { asm!("2: push {{r0-r7}}", "b 2b", options(noreturn)) },
+            PANIC => crash::panicked(None),
+            _ => {}
+        }
+    }
+
+    pub(super) fn note_bus() {
+        let status = can::registers().esr().read();
+        let (transmit, receive) = (u32::from(status.tec().bits()), u32::from(status.rec().bits()));
+        let before = SEEN.peaks.load(Ordering::Relaxed);
+        let peaks = transmit.max(before & 0xFFFF) | receive.max(before >> 16) << 16;
+        SEEN.peaks.store(peaks, Ordering::Relaxed);
+        if let Some(count) = SEEN.errors.get(usize::from(status.lec().bits()).wrapping_sub(1)) {
+            count.store(count.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+            can::mark_error_code();
+        }
+    }
+
+    pub(super) fn note_erase(microseconds: u64) {
+        let longest = SEEN.longest_erase.load(Ordering::Relaxed).max(microseconds as u32);
+        SEEN.longest_erase.store(longest, Ordering::Relaxed);
+    }
+}
