@@ -46,6 +46,15 @@ def shoot(page: Page, name: str) -> None:
     size(page.driver, *DESK)
 
 
+def shoot_dark(page: Page, name: str) -> None:
+    """The picture for readers whose system is dark."""
+    dark = [{"name": "prefers-color-scheme", "value": "dark"}]
+    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": dark})
+    time.sleep(1)
+    save(page.driver.get_screenshot_as_png(), name)
+    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
 def bus_time(page: Page) -> float:
     return page.script("return window.canopen.recorder.t")
 
@@ -69,6 +78,7 @@ def take_page(page: Page) -> None:
     fault.click()
     page.until(lambda: bus_time(page) > begin + SECONDS * 1.1, "measure")
     shoot(page, "live")
+    shoot_dark(page, "live-dark")
     page.view("overview")
     shoot(page, "overview")
     page.view("trace")

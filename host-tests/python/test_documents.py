@@ -122,7 +122,9 @@ def anchors(text: str) -> set[str]:
 
 def links(document: Path) -> list[str]:
     text = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-    return re.findall(r"\]\(([^)#\s]*(?:#[^)\s]*)?)\)", re.sub(r"`[^`\n]*`", "", text))
+    text = re.sub(r"`[^`\n]*`", "", text)
+    pictures = re.findall(r"\b(?:src|srcset)=\"([^\"]*)\"", text)
+    return pictures + re.findall(r"\]\(([^)#\s]*(?:#[^)\s]*)?)\)", text)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: document.name)

@@ -1,4 +1,4 @@
-//! All points of a scene, or some of them.
+//! Injects faults at the points of a scene, or at a sample of them.
 
 use std::collections::{BTreeMap, HashSet};
 use std::thread;
@@ -12,64 +12,64 @@ use crate::reads::{Decoder, Reads};
 use crate::rig::{Outcome, Rig};
 use crate::scene::Scene;
 
-/// How much is tried.
+/// The share of points and faults that a campaign injects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Every so many instructions is a point: 1 takes all.
+    /// Sampling interval of instructions: 1 selects each.
     pub every: usize,
-    /// The same of those that read condition flags.
+    /// Sampling interval of instructions that read condition flags.
     pub every_of_conditions: usize,
-    /// The same of those that run more often than [`OFTEN`].
+    /// Sampling interval of instructions that run more often than [`OFTEN`].
     pub every_of_loops: usize,
-    /// So many bits of the registers that an instruction reads are flipped at each point, one after the other.
+    /// Number of register bits that are flipped at each point, one after the other.
     pub flips: usize,
-    /// Threads, each with a board of its own.
+    /// Number of threads, each with its own board.
     pub boards: usize,
 }
 
-/// What a campaign asks and tells meanwhile.
+/// Callbacks of a running campaign.
 pub struct Watcher<'a> {
-    /// Whether the instruction at this address is to be disturbed.
+    /// Returns whether faults are injected into the instruction at this address.
     pub takes: &'a (dyn Fn(u32) -> bool + Sync),
-    /// A fault has made run what may not.
+    /// Receives each fault that made the bootloader start a forbidden image.
     pub broken: &'a (dyn Fn(Violation) + Sync),
 }
 
-/// What runs more often is a loop of the hashes, of the sums, or of the arithmetic of points: wrong there is the number, not the
-/// decision.
+/// Instructions that run more often belong to loops of the hash, of a CRC, or of the curve arithmetic: a fault there changes a
+/// number, and rarely the decision.
 pub const OFTEN: u64 = 66;
 
-/// A fault that made run what may not.
+/// A fault that made the bootloader start a forbidden image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// Where.
+    /// The instruction, with the number of its visit.
     pub point: Point,
-    /// What.
+    /// The injected fault.
     pub fault: Fault,
 }
 
-/// What was tried, and what came of it.
+/// Injected faults and their outcomes.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
-    /// Instructions that the decision has.
+    /// Number of instructions in the decision.
     pub instructions: usize,
-    /// Those of them that run more often than [`OFTEN`].
+    /// Number of instructions that run more often than [`OFTEN`].
     pub loops: usize,
-    /// Points at which the program was stopped.
+    /// Number of points at which faults were injected.
     pub points: usize,
-    /// Bits of the registers that are read at these points, whether tried or not.
+    /// Number of register bits that are read at these points, flipped or not.
     pub bits: usize,
-    /// Faults by their kind and by what came of them.
+    /// Number of faults by kind and outcome.
     pub outcomes: BTreeMap<(&'static str, &'static str), usize>,
-    /// The faults that made run what may not.
+    /// Faults that made the bootloader start a forbidden image.
     pub violations: Vec<Violation>,
 }
 
 impl Campaign {
-    /// Disturbs the decision of a scene.
+    /// Injects faults into the decision of a scene.
     ///
     /// # Errors
-    /// The image is none for the board, or the decision is wrong without any fault.
+    /// The file is not an image for the board, or the decision without a fault is wrong.
     pub fn run(bootloader: &[u8], scene: &Scene, extent: Extent, watcher: &Watcher<'_>) -> Result<Campaign> {
         let mut rig = Rig::new(bootloader)?;
         let (visits, outcome) = rig.survey(scene)?;
@@ -103,13 +103,13 @@ impl Campaign {
         Ok(all)
     }
 
-    /// Faults that were tried.
+    /// Number of injected faults.
     #[must_use]
     pub fn faults(&self) -> usize {
         self.outcomes.values().sum()
     }
 
-    /// Faults of this kind that were tried: "skips", "flags" or "register bits".
+    /// Number of injected faults of a kind: "skips", "flags" or "register bits".
     #[must_use]
     pub fn tried(&self, kind: &str) -> usize {
         self.outcomes.iter().filter(|((of, _), _)| *of == kind).map(|(_, count)| count).sum()
@@ -138,13 +138,13 @@ impl Campaign {
     }
 }
 
-/// The first visit of an instruction and the last: what a loop does between is like the one or the other.
+/// The first and the last visit of an instruction; visits between them behave like one of the two.
 fn ends(last: &Point) -> impl Iterator<Item = Point> + use<> {
     let first = Point { visit: 1, ..*last };
     [first].into_iter().chain((last.visit > 1).then_some(*last))
 }
 
-/// The instructions that read condition flags, and the IT instructions of blocks that do.
+/// Instructions that read condition flags, and IT instructions of blocks that read them.
 fn conditions(rig: &Rig, points: &[Point]) -> Result<HashSet<u32>> {
     let decoder = Decoder::new()?;
     let mut all = HashSet::new();
@@ -157,7 +157,7 @@ fn conditions(rig: &Rig, points: &[Point]) -> Result<HashSet<u32>> {
     Ok(all)
 }
 
-/// What one board does: it runs once, from point to point.
+/// The share of one board, which runs once from point to point.
 fn part(
     bootloader: &[u8],
     scene: &Scene,
@@ -188,7 +188,7 @@ fn part(
     Ok(campaign)
 }
 
-/// What may be wrong of that which the instructions of a point read.
+/// Faults of the flags and registers that the instructions of a point read.
 fn wrong_reads(reads: &[Reads], point: Point, flips: usize) -> Vec<Fault> {
     let of = |reads| [choice::flags(reads), choice::some_bits(reads, point.visit, flips)].concat();
     reads.iter().flat_map(of).collect()

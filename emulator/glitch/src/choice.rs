@@ -1,4 +1,4 @@
-//! Which faults are tried at a point.
+//! Selection of the faults at a point.
 
 use emulator::Flag;
 use fastrand::Rng;
@@ -6,21 +6,21 @@ use fastrand::Rng;
 use crate::fault::Fault;
 use crate::reads::Reads;
 
-/// Bits of a register.
+/// Number of bits in a register.
 const BITS: usize = 32;
 
-/// Each flag where flags are read.
+/// A fault for each flag if the instruction reads flags.
 pub(crate) fn flags(reads: &Reads) -> Vec<Fault> {
     let at = reads.at;
     if reads.flags { Flag::ALL.map(|flag| Fault::Flag { at, flag }).to_vec() } else { Vec::new() }
 }
 
-/// Bits of the registers that are read.
+/// Number of bits in the registers that the instruction reads.
 pub(crate) fn possible(reads: &Reads) -> usize {
     reads.registers.len() * BITS
 }
 
-/// So many of these bits, each of them at most once: those of a point are the same in every run.
+/// A sample of these bits without repetition. A point has the same sample in every run.
 pub(crate) fn some_bits(reads: &Reads, visit: u64, count: usize) -> Vec<Fault> {
     let at = reads.at;
     let all = reads
@@ -39,7 +39,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_left_alone() {
+    fn flags_and_registers_that_are_not_read_are_not_changed() {
         assert_eq!(flags(&reads(&[1], false)), []);
         assert_eq!(flags(&reads(&[], true)).len(), 4);
         let bits = some_bits(&reads(&[1, 13], false), 1, 20);
@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn where_more_are_wanted_than_there_are_each_bit_is_tried_once() {
+    fn each_bit_is_flipped_once_if_the_sample_is_larger_than_the_registers() {
         let mut bits = some_bits(&reads(&[0, 2, 3], false), 1, 1000);
         assert_eq!(bits.len(), possible(&reads(&[0, 2, 3], false)));
         bits.sort_by_key(|fault| format!("{fault}"));
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_of_the_point_decides() {
+    fn the_sample_is_the_same_for_a_point_and_differs_between_points() {
         let some = |visit| some_bits(&reads(&[0, 2, 3], false), visit, 8);
         assert_eq!(some(1), some(1));
         assert_ne!(some(1), some(2));

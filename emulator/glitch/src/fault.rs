@@ -1,4 +1,4 @@
-//! What goes wrong in the core.
+//! Faults of the core.
 
 use std::fmt;
 
@@ -7,21 +7,21 @@ use emulator::Flag;
 /// One fault of the core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// An instruction does not run.
+    /// An instruction is skipped.
     Skip {
         /// The address of the instruction.
         at: u32,
-        /// Bytes of the instruction.
+        /// Size of the instruction in bytes.
         size: u32,
     },
-    /// A condition flag is another one when this instruction reads the flags, and from then on.
+    /// A condition flag is inverted when this instruction reads the flags, and stays inverted.
     Flag {
         /// The address of the instruction.
         at: u32,
         /// The flag.
         flag: Flag,
     },
-    /// A bit of R0 to R14 is another one when this instruction reads the register, and from then on.
+    /// A bit of R0 to R14 is inverted when this instruction reads the register, and stays inverted.
     Flip {
         /// The address of the instruction.
         at: u32,
@@ -33,7 +33,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The instruction that is the first to be disturbed.
+    /// Address of the first instruction with the fault.
     #[must_use]
     pub fn address(self) -> u32 {
         match self {
@@ -41,7 +41,7 @@ impl Fault {
         }
     }
 
-    /// How a campaign counts the fault.
+    /// Kind of the fault in the counts of a campaign.
     pub(crate) fn kind(self) -> &'static str {
         match self {
             Fault::Skip { .. } => "skips",

@@ -1,20 +1,20 @@
 //! Fault injection: what one skipped instruction, one flipped condition flag, or one flipped bit of one register does to the decision of the bootloader.
 //!
-//! A supply that dips or a clock that stumbles for some nanoseconds makes a processor leave out an instruction or take a wrong value.
-//! Here the emulated board does that, at each point of the decision in turn, and then goes on without further faults. Nothing that
-//! is unsigned, and nothing older than what was there, may start.
+//! A supply dip or a clock glitch of some nanoseconds makes a processor skip an instruction or read a wrong value. The emulated
+//! board injects one such fault at each point of the decision in turn, and continues without further faults. The bootloader must
+//! start no unsigned image and no image older than the previous one.
 //!
 //! | module | |
 //! |---|---|
-//! | `program` | small applications that say that they run |
-//! | `scene` | what lies in the flash, and what must not run |
-//! | `fault` | what goes wrong |
+//! | `program` | small applications that mark RAM when they run |
+//! | `scene` | contents of the flash with a program that must not run |
+//! | `fault` | faults of the core |
 //! | `reads` | the registers and flags that an instruction reads |
-//! | `choice` | the faults of a point |
-//! | `rig` | a board that is switched on, stopped at points, disturbed and watched |
-//! | `restart` | what the bootloader decides by after a reset |
-//! | `campaign` | all points of a scene |
-//! | `places` | where a point is in the source |
+//! | `choice` | selection of the faults at a point |
+//! | `rig` | the board: power-on, stops at points, injection, outcome |
+//! | `restart` | state that survives a reset and enters the decision |
+//! | `campaign` | injection at the points of a scene |
+//! | `places` | functions of the image by address |
 #![forbid(unsafe_code)]
 
 mod campaign;

@@ -8,8 +8,8 @@ use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use glitch::{Campaign, Extent, Places, Scene, Violation, Watcher};
 
-/// Skips each instruction of the bootloader's decision, flips each condition flag where it reads flags, and flips bits of the registers
-/// that it reads: nothing that is unsigned or older may start.
+/// Injects faults into the bootloader's decision: skips each instruction, inverts each condition flag that it reads, and inverts bits of
+/// the registers that it reads. No unsigned and no older image may start.
 #[derive(Parser)]
 #[command(name = "cargo xtask fault-injection", version)]
 struct Cli {
@@ -22,13 +22,13 @@ struct Cli {
     /// Only functions whose name contains this; may be given more than once
     #[arg(long)]
     within: Vec<String>,
-    /// Take every so many instructions
+    /// Interval between sampled instructions; 1 selects each
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every: u16,
-    /// Take every so many of those in the loops of hashes, sums and points
+    /// Interval between sampled instructions in the loops of hash, CRC and curve arithmetic
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every_of_loops: u16,
-    /// Flip so many bits of the registers that an instruction reads; a register has 32
+    /// Number of register bits to flip at each instruction; a register has 32
     #[arg(long, default_value_t = 4)]
     flips: usize,
 }
@@ -74,8 +74,8 @@ fn run(cli: &Cli) -> Result<()> {
         print(&campaign, begin.elapsed().as_secs_f64());
         violations += campaign.violations.len();
     }
-    ensure!(violations == 0, "{violations} faults made run what may not");
-    println!("nothing unsigned and nothing older has started");
+    ensure!(violations == 0, "{violations} faults started a forbidden image");
+    println!("no unsigned and no older image has started");
     Ok(())
 }
 
@@ -84,7 +84,7 @@ fn print(campaign: &Campaign, seconds: f64) {
     println!("  {instructions} instructions, {loops} of them in loops of hashes, sums and points");
     println!("  {} faults at {points} points, {seconds:.0} s", campaign.faults());
     println!(
-        "  {} skips, {} flags, {} of {} bits of the registers that are read",
+        "  {} skips, {} flags, {} of {} bits of the read registers",
         campaign.tried("skips"),
         campaign.tried("flags"),
         campaign.tried("register bits"),

@@ -1,4 +1,4 @@
-//! Where an address is in the source.
+//! Functions of an image by address.
 
 use anyhow::{Context, Result};
 use object::{Object, ObjectSymbol};
@@ -7,10 +7,10 @@ use object::{Object, ObjectSymbol};
 pub struct Places(Vec<(u32, String)>);
 
 impl Places {
-    /// Of an ELF file.
+    /// Reads the functions of an ELF file.
     ///
     /// # Errors
-    /// It is none.
+    /// The bytes are not an ELF file.
     pub fn of(elf: &[u8]) -> Result<Places> {
         let file = object::File::parse(elf).context("no ELF file")?;
         let functions = file.symbols().filter(|symbol| symbol.kind() == object::SymbolKind::Text);
@@ -25,7 +25,7 @@ impl Places {
         Ok(Places(all))
     }
 
-    /// The function that an address is in, and the distance from its start.
+    /// Function at an address, with the distance from its start.
     #[must_use]
     pub fn name(&self, address: u32) -> String {
         let after = self.0.partition_point(|(start, _)| *start <= address);

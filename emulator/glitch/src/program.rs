@@ -1,24 +1,24 @@
-//! Small applications: whichever instruction is the first, they leave a word in RAM and wait for the watchdog.
+//! Small applications that write a word to RAM from any entry point, and wait for the watchdog.
 
 use bsp::sectors::FLASH;
 use bsp::update_layout::LAYOUT;
 use update::HEADER_LEN;
 
-/// Where the word goes: the far end of the stack, which the bootloader does not reach.
+/// Address of the word: the far end of the stack, which the bootloader does not reach.
 pub(crate) const PLACE: u32 = 0x2000_0000;
-/// The application that may run.
+/// Word of the permitted application.
 pub(crate) const GOOD: u32 = 0x600D_600D;
-/// The application that may not.
+/// Word of the forbidden application.
 pub(crate) const BAD: u32 = 0x0BAD_0BAD;
 
 const STACK: u32 = 0x2002_0000;
-/// Entry and exceptions: a fault on the way to the application is no way into it.
+/// Number of vectors, all of which lead to the entry: a fault before the application also starts it.
 const VECTORS: u32 = 15;
 const NOP: u16 = 0xBF00;
-/// Instructions that do nothing in front of those that do something: a jump to the wrong place is seen too.
+/// Number of NOPs before the code, so that a jump to a wrong address also runs it.
 const SLED: usize = 56;
 
-/// The code of an application that leaves this word, with its vector table.
+/// Code of an application that writes this word, with its vector table.
 pub(crate) fn code(word: u32) -> Vec<u8> {
     let entry = FLASH + LAYOUT.application().start() + HEADER_LEN as u32 + 4 * (1 + VECTORS);
     // ldr r0, =PLACE; ldr r1, =word; str r1, [r0]; b .

@@ -1,4 +1,4 @@
-//! What an instruction reads of the core: a register or a flag that is wrong matters where the register or the flag is read next.
+//! Registers and flags that an instruction reads. A wrong value takes effect at the next instruction that reads it.
 
 use std::collections::BTreeSet;
 
@@ -7,14 +7,14 @@ use capstone::arch::arm::{ArchExtraMode, ArchMode, ArmCC, ArmOperandType, ArmReg
 use capstone::arch::{BuildsCapstone, BuildsCapstoneExtraMode, DetailsArchInsn};
 use capstone::{AccessType, Capstone, Insn, InsnDetail, RegId, RegIdInt};
 
-/// What an instruction reads.
+/// Registers and flags that an instruction reads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Reads {
     /// The address of the instruction.
     pub(crate) at: u32,
-    /// Those of R0 to R14.
+    /// Numbers of the registers R0 to R14.
     pub(crate) registers: BTreeSet<u8>,
-    /// At least one of the condition flags.
+    /// Whether the instruction reads a condition flag.
     pub(crate) flags: bool,
 }
 
@@ -28,7 +28,7 @@ impl Decoder {
         Ok(Decoder(builder.detail(true).build()?))
     }
 
-    /// What the instructions of this code read, one after the other. The code must not begin within an IT block.
+    /// Registers and flags of each instruction in this code. The code must not begin within an IT block.
     pub(crate) fn reads(&self, at: u32, code: &[u8]) -> Result<Vec<Reads>> {
         self.0.disasm_all(code, at.into())?.iter().map(|instruction| self.of(instruction)).collect()
     }
@@ -43,7 +43,7 @@ impl Decoder {
     }
 }
 
-/// All that the instruction reads: what the encoding implies, such as the stack pointer, and what the operands name.
+/// Registers of the encoding, such as the stack pointer, and of the operands.
 fn registers(detail: &InsnDetail<'_>, instruction: &Insn<'_>) -> Result<Vec<RegId>> {
     let adds = starts_with_one_of(instruction, &SUMS);
     let mut all = detail.regs_read().to_vec();
@@ -58,11 +58,11 @@ fn registers(detail: &InsnDetail<'_>, instruction: &Insn<'_>) -> Result<Vec<RegI
     Ok(all)
 }
 
-/// They add a product to a sum in two registers, which capstone has as written only.
+/// Instructions that add a product to a sum in two registers; capstone reports these registers as written only.
 const SUMS: [&str; 4] = ["umlal", "umaal", "smlal", "smlsld"];
 
-/// Whether the outcome depends on a flag: by a condition, by a carry that is added or moved in, or because the flags are what is read. An
-/// IT instruction leaves the conditions to its block.
+/// Whether the result depends on a flag: by a condition, by a carry, or by a read of the flags. The instructions of an IT block have the
+/// conditions, the IT instruction has none.
 fn reads_flags(detail: &InsnDetail<'_>, instruction: &Insn<'_>) -> Result<bool> {
     let condition = detail.arch_detail().arm().context(NOT_ARM)?.cc();
     let is_it = starts_with_one_of(instruction, &["it"]);
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn the_registers_that_are_read_and_no_others() {
+    fn read_registers_are_reported_and_no_others() {
         for (halves, registers, name) in [
             (&[0x1888][..], &[1, 2][..], "adds r0, r1, r2"),
             (&[0x2001], &[], "movs r0, #1"),
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_depends_on_a_flag() {
+    fn instructions_that_depend_on_a_flag_are_reported() {
         for (halves, flags, name) in [
             (&[0xD003][..], &[true][..], "beq"),
             (&[0xE003], &[false], "b"),

@@ -1,5 +1,5 @@
-//! What the bootloader decides by after a reset. Most faults end in a reset, and most of these resets leave the same: so the decision
-//! after such a reset is run once.
+//! State that survives a reset and enters the decision of the bootloader. Most faults end in a reset, and most of these resets leave
+//! the same state, so the decision after each state is run once.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
@@ -8,27 +8,27 @@ use bsp::crash_record::{Crash, Sealed, WORDS};
 use chip::{Peripherals, Stm32f4};
 use emulator::Machine;
 
-/// The region RETAINED (memory.x): of RAM the bootloader reads nothing else before it has written it.
+/// The region RETAINED (memory.x): the bootloader reads no other RAM before it has written it.
 const RETAINED: Range<u32> = 0x2001_FF00..0x2002_0000;
-/// Where the crash record is in RETAINED, after the handover and the count of crashes (bsp, `retained`).
+/// Place of the crash record in RETAINED, after the handover and the count of crashes (bsp, `retained`).
 const CRASH: Range<usize> = 12..12 + 4 * WORDS;
-/// RCC_CSR: why the chip was reset.
+/// RCC_CSR: the cause of the reset.
 const CAUSE: u32 = 0x4002_3874;
 
-/// All that is left after a reset and can change what the bootloader decides.
+/// State after a reset that can change the decision of the bootloader.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Restart {
     /// A hash of the flash.
     flash: u64,
     /// RETAINED with an empty crash record.
     retained: Vec<u8>,
-    /// There is a crash record: the bootloader looks for nothing else in the record.
+    /// Whether a crash record exists: the bootloader reads nothing else from it.
     is_crash: bool,
     cause: Option<u32>,
 }
 
 impl Restart {
-    /// Of a machine that was just reset.
+    /// State of a machine that was just reset.
     pub(crate) fn of(machine: &mut Machine<Stm32f4>) -> Restart {
         let mut hasher = DefaultHasher::new();
         machine.flash().hash(&mut hasher);
@@ -47,7 +47,7 @@ fn record(retained: &[u8]) -> Sealed {
     std::array::from_fn(|at| u32::from_le_bytes(words[at]))
 }
 
-/// What a reset leaves alone of RAM.
+/// RAM that a reset does not change.
 pub(crate) fn retained(machine: &Machine<Stm32f4>) -> Vec<u8> {
     let mut bytes = vec![0; RETAINED.len()];
     let _ = machine.read(RETAINED.start, &mut bytes);

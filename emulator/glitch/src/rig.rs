@@ -1,4 +1,4 @@
-//! A board at which one thing goes wrong.
+//! A board with one injected fault.
 
 use std::collections::HashMap;
 
@@ -13,57 +13,58 @@ use crate::restart::{self, Restart};
 use crate::scene::{Begin, Scene};
 
 const FLASH: u32 = 512 * 1024;
-/// Where code runs that was copied from flash.
+/// Start of RAM, where code that was copied from flash runs.
 const RAM: u32 = 0x2000_0000;
 const PC: u8 = 15;
 
-/// How long a board is given at once.
+/// Time slice of a board.
 const SLICE: Time = Time::from_millis(2);
-/// A bootloader that has been asleep for so long has decided to stay.
+/// Time asleep after which the bootloader has decided to stay.
 const SETTLED: Time = Time::from_millis(20);
-/// Longer than erasing and copying, or three resets by the watchdog, take.
+/// Time limit of a run: longer than erase and copy, and than three resets by the watchdog.
 const LIMIT: Time = Time::from_millis(8000);
 
-/// What comes of it.
+/// Outcome of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// What may not run has run.
+    /// The forbidden application has run.
     Broken,
-    /// The application that may run does.
+    /// The permitted application runs.
     Good,
     /// The bootloader stays.
     Stays,
-    /// Neither within eight seconds: it is reset again and again.
+    /// Neither application runs within eight seconds, because the board is reset repeatedly.
     Nothing,
 }
 
-/// A core without a clock is in its next instruction for seconds: the watchdog and the start after it are still waited for.
+/// Least number of slices: a core without a clock needs seconds for its next instruction, and the run includes the watchdog reset and
+/// the start after it.
 const LEAST_SLICES: usize = 1000;
 
-/// Which of the outcomes that are known.
+/// Indexes of the cached outcomes.
 const WITHOUT: usize = 0;
 const WITH_ANOTHER_START: usize = 1;
 
 /// A run to its end.
 struct Run {
     outcome: Outcome,
-    /// The outcome is that of an earlier run, which went on from the same reset.
+    /// Whether the outcome is that of an earlier run with the same reset state.
     is_known: bool,
-    /// The resets on the way.
+    /// Resets during the run.
     restarts: Vec<Restart>,
 }
 
 pub(crate) struct Rig {
     machine: Machine<Stm32f4>,
     bootloader: Vec<u8>,
-    /// What a reset leaves alone, at the end of a decision without a fault.
+    /// RAM that a reset does not change, after a decision without a fault.
     pub(crate) undisturbed: Vec<u8>,
-    /// What has come of the resets so far, before another start that only shows whether a proof was left behind, and after.
+    /// Cached outcomes by reset state, without and with the extra start that checks for a forged proof.
     known: [HashMap<Restart, Outcome>; 2],
 }
 
 impl Rig {
-    /// With the ELF file of the bootloader.
+    /// A board with this ELF file of the bootloader.
     pub(crate) fn new(bootloader: &[u8]) -> Result<Rig> {
         let chip = Stm32f4::new(Variant::F446, Board::default());
         let mut machine = Machine::new(Model::stm32f4(FLASH), chip)?;
@@ -72,7 +73,7 @@ impl Rig {
         Ok(Rig { machine, bootloader, undisturbed: Vec::new(), known: [HashMap::new(), HashMap::new()] })
     }
 
-    /// Brings the board to the start at which it decides, and watches from there for these points.
+    /// Runs the board to the start of the decision, and stops at these points from there on.
     pub(crate) fn start(&mut self, scene: &Scene, stops: Vec<Point>) -> Result<()> {
         self.machine.unwatch()?;
         self.machine.power_off();
@@ -87,7 +88,7 @@ impl Rig {
         Ok(self.machine.watch(stops)?)
     }
 
-    /// Lets the good application run, puts the other in its place, and waits for the watchdog.
+    /// Runs the permitted application, exchanges it for the other one, and waits for the watchdog.
     fn exchange(&mut self, flash: &[u8]) -> Result<()> {
         let Outcome::Good = self.outcome(true) else { bail!("the good application does not run") };
         self.machine.set_flash(flash)?;
@@ -100,7 +101,7 @@ impl Rig {
         Ok(())
     }
 
-    /// Runs on to the next point; `None` at the end of the decision.
+    /// Continues to the next point; `None` at the end of the decision.
     pub(crate) fn next(&mut self, has_good: bool) -> Result<Option<Point>> {
         self.machine.resume_watch()?;
         let (begin, mut slept) = (self.machine.now(), self.machine.stats().asleep);
@@ -115,7 +116,7 @@ impl Rig {
         Ok(None)
     }
 
-    /// The instructions from the decision's start to its end that were run from RAM, with the number of their visits.
+    /// Instructions of the decision that ran from RAM, with the number of their visits.
     pub(crate) fn survey(&mut self, scene: &Scene) -> Result<(Vec<Point>, Outcome)> {
         self.start(scene, Vec::new())?;
         self.next(scene.has_good)?;
@@ -125,7 +126,7 @@ impl Rig {
         Ok((visits, outcome))
     }
 
-    /// A moment to go back to, out of the watch.
+    /// Saves the state of the board and ends the watch.
     pub(crate) fn stop(&mut self) -> Result<Moment<Stm32f4>> {
         self.machine.unwatch()?;
         Ok(self.machine.moment()?)
@@ -135,12 +136,12 @@ impl Rig {
         Ok(self.machine.go_back(moment)?)
     }
 
-    /// The skips that are possible here.
+    /// Skips that are possible at this point.
     pub(crate) fn skips(&self) -> Vec<Fault> {
         self.machine.next_instructions().into_iter().map(|(at, size)| Fault::Skip { at, size }).collect()
     }
 
-    /// Of the instruction at this address, and of its block where it is an IT instruction.
+    /// Code of the instruction at this address, for an IT instruction with its block.
     pub(crate) fn code(&self, address: u32) -> Vec<u8> {
         let sizes = self.machine.instructions_at(address).into_iter().map(|(_, size)| size as usize);
         let mut code = vec![0; sizes.sum()];
@@ -148,7 +149,7 @@ impl Rig {
         code
     }
 
-    /// Does it, and runs to the end.
+    /// Injects the fault and runs to the outcome.
     pub(crate) fn disturb(&mut self, fault: Fault, has_good: bool) -> Result<Outcome> {
         match fault {
             Fault::Skip { at, size } => self.machine.skip((at, size))?,
@@ -164,7 +165,7 @@ impl Rig {
         Ok(self.final_outcome(has_good))
     }
 
-    /// What has settled gets another start where the fault has changed what the next start goes by: it must not leave a proof behind.
+    /// Outcome with an extra start if the bootloader stays and the fault has changed retained RAM: a forged proof must not start an image.
     fn final_outcome(&mut self, has_good: bool) -> Outcome {
         let run = self.run(has_good, WITH_ANOTHER_START);
         let starts_again = run.outcome == Outcome::Stays
@@ -179,21 +180,21 @@ impl Rig {
         outcome
     }
 
-    /// What comes of it.
+    /// Runs to the outcome and caches it.
     fn outcome(&mut self, has_good: bool) -> Outcome {
         let run = self.run(has_good, WITHOUT);
         self.learn(WITHOUT, run.restarts, run.outcome);
         run.outcome
     }
 
-    /// These resets have led to this outcome. What did not come in time may come after a later reset in time.
+    /// Caches the outcome for these resets. A time-out is not cached, because a later reset may have an outcome in time.
     fn learn(&mut self, which: usize, restarts: Vec<Restart>, outcome: Outcome) {
         if outcome != Outcome::Nothing {
             self.known[which].extend(restarts.into_iter().map(|restart| (restart, outcome)));
         }
     }
 
-    /// Runs to the end, or to a reset after which the outcome is known.
+    /// Runs to the outcome, or to a reset state with a cached outcome.
     fn run(&mut self, has_good: bool, which: usize) -> Run {
         let mut restarts = Vec::new();
         let (begin, mut slept) = (self.machine.now(), self.machine.stats().asleep);
@@ -213,7 +214,7 @@ impl Rig {
         Run { outcome: Outcome::Nothing, is_known: false, restarts }
     }
 
-    /// The outcome, where the board has come to one.
+    /// The outcome, if the board has reached one.
     fn seen(&self, has_good: bool, slept: &mut Time) -> Option<Outcome> {
         match self.word() {
             BAD => Some(Outcome::Broken),
@@ -222,7 +223,7 @@ impl Rig {
         }
     }
 
-    /// What an application has left.
+    /// Word that an application has written.
     fn word(&self) -> u32 {
         let mut bytes = [0; 4];
         let _ = self.machine.read(PLACE, &mut bytes);
@@ -230,8 +231,8 @@ impl Rig {
     }
 }
 
-/// Whether the bootloader stays for good. Where another application is to run it sleeps while sectors are erased, and stays only
-/// when it has slept for much longer.
+/// Whether the bootloader stays. With another application to copy it sleeps while sectors are erased, so it stays only after a much
+/// longer sleep.
 fn has_settled(machine: &Machine<Stm32f4>, has_good: bool, slept: &mut Time) -> bool {
     let long = if has_good { SETTLED * 250 } else { SETTLED };
     machine.stats().asleep.since(*slept) > long

@@ -1,4 +1,4 @@
-//! What lies in the flash when a board is switched on, and what the bootloader has to make of it.
+//! Contents of the flash at power-on, and the decision that the bootloader must make.
 
 use std::sync::LazyLock;
 
@@ -19,30 +19,30 @@ const OWNER: [u8; 32] = [0x42; 32];
 const NEWER: u32 = 3;
 const OLDER: u32 = 2;
 
-/// How it comes to the decision.
+/// Event before the decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Begin {
-    /// Power comes.
+    /// Power-on.
     Power,
-    /// The watchdog resets the chip, after an application has run whose signature was found good. This is the flash from then on.
+    /// Watchdog reset, after an application with a good signature has run. The flash of the scene replaces that of the application.
     Reset,
 }
 
 /// A content of the flash that holds a program which must not run.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What it is called.
+    /// Name of the scene.
     pub name: &'static str,
-    /// What the program is that must not run.
+    /// Description of the program that must not run.
     pub what: &'static str,
     pub(crate) flash: Vec<u8>,
     pub(crate) begin: Begin,
-    /// Another program has to run; else the bootloader stays.
+    /// Whether another program must run; otherwise the bootloader stays.
     pub(crate) has_good: bool,
 }
 
 impl Scene {
-    /// All of them.
+    /// All scenes.
     ///
     /// # Errors
     /// The images cannot be made.
@@ -53,39 +53,31 @@ impl Scene {
         let alone = |name, what, flash, begin| Scene { name, what, flash, begin, has_good: false };
         let staged = |name, what, flash| Scene { name, what, flash, begin: Begin::Power, has_good: true };
         Ok(vec![
-            alone("unsigned", "an application that nobody has signed", bare(&unsigned), Begin::Power),
+            alone("unsigned", "an unsigned application", bare(&unsigned), Begin::Power),
             alone(
                 "neutral",
-                "an application whose signature fits an equation that is left out",
+                "an application with a signature of the neutral point and zero",
                 bare(&neutral()?.to_bytes()),
                 Begin::Power,
             ),
             alone("bare", "an application without a header", bare(&headless), Begin::Power),
             alone(
                 "exchanged",
-                "an application that took the place of a signed one before a reset",
+                "an unsigned application that has replaced a signed one before a reset",
                 bare(&unsigned),
                 Begin::Reset,
             ),
-            staged(
-                "older",
-                "an older image, signed, that waits to be copied",
-                waiting(&older()?.to_bytes())?,
-            ),
-            staged(
-                "waiting",
-                "an image that nobody has signed and that waits to be copied",
-                waiting(&unsigned)?,
-            ),
+            staged("older", "an older signed image that waits to be copied", waiting(&older()?.to_bytes())?),
+            staged("waiting", "an unsigned image that waits to be copied", waiting(&unsigned)?),
             staged(
                 "returning",
-                "an image that nobody has signed in the place of the one before a trial that is lost",
+                "an unsigned image in place of the kept one after a failed trial",
                 returning(&unsigned)?,
             ),
         ])
     }
 
-    /// A flash with the application that may run.
+    /// A flash with the permitted application.
     pub(crate) fn good() -> Result<Vec<u8>> {
         Ok(with(erased(), &newer()?.to_bytes()))
     }
@@ -112,12 +104,12 @@ fn older() -> Result<Image> {
     signed(BAD, OLDER)
 }
 
-/// Newer than what is there, for this product, with good sums.
+/// An unsigned image, newer than the application, for this board, with correct CRCs.
 fn unsigned() -> Result<Image> {
     with_signature([0; 64])
 }
 
-/// The same. R is the neutral point, at which the sum of the equation begins, and S is zero.
+/// The same image with a signature of R = neutral point, where the sum of the equation begins, and S = 0.
 fn neutral() -> Result<Image> {
     let mut signature = [0; 64];
     signature[0] = 1;
@@ -129,7 +121,7 @@ fn with_signature(signature: [u8; 64]) -> Result<Image> {
     Ok(Image { header: image.header.with_signature(signature), ..image })
 }
 
-/// Of the sectors.
+/// Sizes of the sectors.
 fn sizes() -> Vec<usize> {
     sectors::all().map(|sector| sector.size as usize).collect()
 }
@@ -147,15 +139,15 @@ fn put(flash: &mut [u8], at: u32, bytes: &[u8]) {
     flash[at as usize..at as usize + bytes.len()].copy_from_slice(bytes);
 }
 
-/// A flash in which an image waits to be copied over the good application, which has run. The record that says so was made for an
-/// image that was good: whoever can write the flash writes the record too.
+/// A flash with an image that waits to be copied over the permitted application, which has run. The commit record was made for a good
+/// image: an attacker who can write the flash can write the record too.
 fn waiting(image: &[u8]) -> Result<Vec<u8>> {
     let mut flash = downloaded()?.bytes().clone();
     put(&mut flash, LAYOUT.staging().start(), image);
     Ok(flash)
 }
 
-/// A flash in which the good application has lost its trial. The image before it, which was good, is another one now.
+/// A flash in which the permitted application has failed its trial, and the kept image was replaced by another one.
 fn returning(image: &[u8]) -> Result<Vec<u8>> {
     let mut flash = downloaded()?;
     let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
@@ -170,7 +162,7 @@ fn returning(image: &[u8]) -> Result<Vec<u8>> {
     Ok(flash)
 }
 
-/// A flash with the good application, which has run, and the same once more in staging, checked.
+/// A flash with the permitted application, which has run, and a checked copy in staging.
 fn downloaded() -> Result<MockFlash> {
     let mut flash = MockFlash::new(&sizes(), 1);
     let erased = flash.program(LAYOUT.application().start(), &newer()?.to_bytes());

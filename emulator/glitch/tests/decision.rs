@@ -1,11 +1,11 @@
-//! The bootloader as its owner builds it, with one fault in its decision. Here a part of the points, with `--thorough` more; all of
-//! them by `cargo xtask fault-injection`.
+//! The bootloader of an owner with one fault in its decision. These tests sample the points, with `--thorough` more of them;
+//! `cargo xtask fault-injection` covers all.
 
 use std::path::{Path, PathBuf};
 
 use glitch::{Campaign, Extent, Places, Scene, Watcher};
 
-/// $NODE_IMAGES, or where cargo puts them.
+/// The image in $NODE_IMAGES, or in the target directory of cargo.
 fn bootloader() -> Vec<u8> {
     let built = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/thumbv7em-none-eabihf/release");
     let path = std::env::var_os("NODE_IMAGES").map_or_else(built, PathBuf::from).join("bootloader-owner");
@@ -20,7 +20,7 @@ fn extent() -> Extent {
     }
 }
 
-/// Every scene by itself: the slowest tests begin first.
+/// One test for each scene, so that they run in parallel.
 fn holds(name: &str) {
     let bootloader = bootloader();
     let scene = Scene::all().unwrap().into_iter().find(|scene| scene.name == name).unwrap();
@@ -34,40 +34,40 @@ fn holds(name: &str) {
         .map(|violation| (violation.fault, violation.point.visit, places.name(violation.fault.address())));
     assert_eq!(broken.collect::<Vec<_>>(), [], "{}", scene.what);
     assert!(campaign.faults() > 5);
-    assert!(campaign.tried("flags") > 5, "no condition was turned round");
+    assert!(campaign.tried("flags") > 5, "no flag was inverted");
 }
 
 #[test]
-fn an_application_that_nobody_has_signed_does_not_start() {
+fn an_unsigned_application_is_not_started() {
     holds("unsigned");
 }
 
 #[test]
-fn an_application_whose_signature_fits_an_equation_that_is_left_out_does_not_start() {
+fn a_signature_of_the_neutral_point_is_not_accepted() {
     holds("neutral");
 }
 
 #[test]
-fn an_application_without_a_header_does_not_start() {
+fn an_application_without_a_header_is_not_started() {
     holds("bare");
 }
 
 #[test]
-fn an_application_that_took_the_place_of_a_signed_one_does_not_start() {
+fn an_application_that_was_exchanged_before_a_reset_is_not_started() {
     holds("exchanged");
 }
 
 #[test]
-fn an_older_image_is_not_copied() {
+fn an_older_staged_image_is_not_started() {
     holds("older");
 }
 
 #[test]
-fn an_unsigned_image_is_not_started_after_a_copy() {
+fn an_unsigned_staged_image_is_not_started() {
     holds("waiting");
 }
 
 #[test]
-fn an_unsigned_image_does_not_come_back_after_a_trial() {
+fn an_unsigned_kept_image_is_not_restored_after_a_failed_trial() {
     holds("returning");
 }
