@@ -2,7 +2,8 @@
 
 A fenced block with `{test=NAME}` after its language is run. The blocks of one name in one document share a simulator,
 which a line `cargo sim` starts with its flags. `sh` blocks run in bash, `python` blocks in this interpreter, and the lines
-of `text` blocks are typed into the simulator's terminal.
+of `text` blocks are typed into the simulator's terminal. A `console` block has commands after `$ ` and their output; a
+command fails where its output is an error.
 """
 
 import os
@@ -22,6 +23,9 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```(\w+) \{test=(\w+)\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 Block = tuple[str, str]
+
+#: The exit code of `nodectl diff` for two configurations that differ.
+DIFFERENCE = 8
 
 
 def threads() -> dict[str, list[Block]]:
@@ -47,12 +51,13 @@ class Thread:
         getattr(self, language)(text)
 
     def sh(self, text: str) -> None:
-        text = text.replace("cargo run -q -p nodectl --", "nodectl")
+        text = re.sub(r"cargo run (-q )?-p nodectl --", "nodectl", text)
         text = text.replace("target/thumbv7em-none-eabihf/release", os.environ["NODE_IMAGES"])
         lines = text.splitlines()
         for line in [line for line in lines if line.startswith("cargo sim")]:
             assert self.simulator is None, "the thread has a simulator"
-            self.simulator = Simulator(*shlex.split(line, comments=True)[2:], speed="real")
+            flags, _, speed = line.partition(" --speed ")
+            self.simulator = Simulator(*shlex.split(flags, comments=True)[2:], speed=speed.split(" ")[0] or "real")
             self._wait_for_the_boards()
         self._succeeds("\n".join(line for line in lines if not line.startswith("cargo sim")))
 
@@ -79,6 +84,12 @@ class Thread:
         text = text.replace("29536", str(self.simulator.socketcand))
         run = self._run([sys.executable, "-c", text], ROOT, dict(os.environ))
         assert run.returncode == 0, f"{run.stdout}{run.stderr}"
+
+    def console(self, text: str) -> None:
+        for command, output in re.findall(r"^\$ (.*)\n((?:[^$].*\n|\n)*)", text, re.MULTILINE):
+            expected = [1] if output.startswith("nodectl: ") else [0, DIFFERENCE] if " diff " in command else [0]
+            run = self._bash(command)
+            assert run.returncode in expected, f"{command}\n{run.stdout}{run.stderr}"
 
     def text(self, text: str) -> None:
         for line in text.splitlines():
