@@ -123,6 +123,33 @@ def test_commands_are_tagged():
             assert not untagged, f"{document.name}: {untagged}"
 
 
+def commands(document: Path) -> list[str]:
+    """The commands of `nodectl` in a document, in blocks and in the text, without comments and placeholders."""
+    text = document.read_text(encoding="utf-8").replace("cargo run -q -p nodectl --", "nodectl").replace("\\\n", " ")
+    lines = re.findall(r"^(?:\$ )?(nodectl [^\n]*)", "\n".join(re.findall(r"^```.*?^```", text, re.M | re.S)), re.M)
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    inline = [re.sub(r"\s+", " ", command) for command in re.findall(r"`(nodectl [^`]+)`", text)]
+    found = [re.sub(r"\s+(#|>|&&|\|) .*", "", command).strip() for command in lines + inline]
+    return [command for command in found if not re.search(r"…|\.\.\.|\b[A-Z]{3,}\b|\[", command)]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: document.name)
+def test_commands_are_understood(document: Path):
+    """Without a bus a command ends with exit code 4, or 7 without its file, and a wrong one with 2."""
+    environment = {**os.environ, "NODECTL_BUS": "socketcand://127.0.0.1:9/none"}
+    wrong = []
+    for command in commands(document):
+        arguments = shlex.split(command)[1:]
+        if {"serve", "man", "completions", "explain"} & set(arguments):
+            continue
+        command_line = [os.environ["NODECTL_COMMAND"], *arguments]
+        run = subprocess.run(command_line, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE)
+        is_mention = re.search("required arguments were not provided|a value is required", run.stderr) or len(arguments) == 1
+        if run.returncode == 2 and not is_mention:
+            wrong.append((command, run.stderr.splitlines()[:1]))
+    assert not wrong
+
+
 def anchors(text: str) -> set[str]:
     """The anchors of the headings, as GitHub makes them."""
     text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
