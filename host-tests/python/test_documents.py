@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import error_budget
 import pytest
@@ -176,6 +177,16 @@ def test_links_lead_to_files_and_headings(document: Path):
         if not target.exists() or (anchor and anchor not in anchors(target.read_text(encoding="utf-8"))):
             broken.append(link)
     assert not broken
+
+
+def test_drawings_are_shown_and_described():
+    shown = {(document.parent / link).resolve() for document in DOCUMENTS for link in links(document)}
+    for drawing in sorted((ROOT / "docs" / "drawings").glob("*.svg")):
+        root = ElementTree.parse(drawing).getroot()
+        described = {element.tag.rpartition("}")[2] for element in root if element.text}
+        assert {"title", "desc", "style"} <= described, drawing.name
+        assert "prefers-color-scheme: dark" in drawing.read_text(encoding="utf-8"), drawing.name
+        assert drawing in shown, drawing.name
 
 
 def test_the_error_budget_is_that_of_its_circuits():
