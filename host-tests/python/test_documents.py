@@ -25,6 +25,9 @@ BLOCK = re.compile(r"^```(\w+) \{test=(\w+)\}\n(.*?)^```$", re.MULTILINE | re.DO
 
 Block = tuple[str, str]
 
+#: A path of a file that the reader makes.
+EXAMPLE = re.compile(r"NAME|my_f407")
+
 #: The exit code of `nodectl diff` for two configurations that differ.
 DIFFERENCE = 8
 
@@ -53,7 +56,7 @@ class Thread:
 
     def sh(self, text: str) -> None:
         text = re.sub(r"cargo run (-q )?-p nodectl --", "nodectl", text)
-        text = text.replace("target/thumbv7em-none-eabihf/release", os.environ["NODE_IMAGES"])
+        text = text.replace("target/thumbv7em-none-eabihf/release", str(Path(os.environ["NODE_IMAGES"]).resolve()))
         lines = text.splitlines()
         for line in [line for line in lines if line.startswith("cargo sim")]:
             assert self.simulator is None, "the thread has a simulator"
@@ -149,6 +152,24 @@ def test_commands_are_understood(document: Path):
         if run.returncode == 2 and not is_mention:
             wrong.append((command, run.stderr.splitlines()[:1]))
     assert not wrong
+
+
+def test_commands_of_the_project_exist():
+    source = (ROOT / "xtask/src/main.rs").read_text(encoding="utf-8")
+    variants = re.findall(r"^    ([A-Z][A-Za-z]+)(?: \{|\(|,)", source, re.MULTILINE)
+    known = {re.sub(r"(?<!^)(?=[A-Z])", "-", variant).lower() for variant in variants}
+    for document in DOCUMENTS:
+        named = set(re.findall(r"cargo xtask ([a-z][a-z-]+)", document.read_text(encoding="utf-8")))
+        assert named <= known, document.name
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: document.name)
+def test_paths_exist(document: Path):
+    """Paths from the root of the repository, in code. A brace or a star stands for several files."""
+    text = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    folders = "bench|bootloader|crates|docs|eds|emulator|firmware|host-tests|tools|xtask"
+    named = re.findall(rf"`((?:{folders})/[\w./-]+)`", text)
+    assert not [path for path in named if not (ROOT / path).exists() and not EXAMPLE.search(path)]
 
 
 def anchors(text: str) -> set[str]:
