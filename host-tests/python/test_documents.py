@@ -2,7 +2,8 @@
 
 A fenced block with `{test=NAME}` after its language is run. The blocks of one name in one document share a simulator,
 which a line `cargo sim` starts with its flags. `sh` blocks run in bash, `python` blocks in this interpreter, and the lines
-of `text` blocks are typed into the simulator's terminal.
+of `text` blocks are typed into the simulator's terminal. A `console` block has commands after `$ ` and their output; a
+command fails where its output is an error.
 """
 
 import os
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import error_budget
 import pytest
@@ -22,6 +24,12 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```(\w+) \{test=(\w+)\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 Block = tuple[str, str]
+
+#: A path of a file that the reader makes.
+EXAMPLE = re.compile(r"NAME|my_f407")
+
+#: The exit code of `nodectl diff` for two configurations that differ.
+DIFFERENCE = 8
 
 
 def threads() -> dict[str, list[Block]]:
@@ -47,12 +55,13 @@ class Thread:
         getattr(self, language)(text)
 
     def sh(self, text: str) -> None:
-        text = text.replace("cargo run -q -p nodectl --", "nodectl")
-        text = text.replace("target/thumbv7em-none-eabihf/release", os.environ["NODE_IMAGES"])
+        text = re.sub(r"cargo run (-q )?-p nodectl --", "nodectl", text)
+        text = text.replace("target/thumbv7em-none-eabihf/release", str(Path(os.environ["NODE_IMAGES"]).resolve()))
         lines = text.splitlines()
         for line in [line for line in lines if line.startswith("cargo sim")]:
             assert self.simulator is None, "the thread has a simulator"
-            self.simulator = Simulator(*shlex.split(line, comments=True)[2:], speed="real")
+            flags, _, speed = line.partition(" --speed ")
+            self.simulator = Simulator(*shlex.split(flags, comments=True)[2:], speed=speed.split(" ")[0] or "real")
             self._wait_for_the_boards()
         self._succeeds("\n".join(line for line in lines if not line.startswith("cargo sim")))
 
@@ -79,6 +88,12 @@ class Thread:
         text = text.replace("29536", str(self.simulator.socketcand))
         run = self._run([sys.executable, "-c", text], ROOT, dict(os.environ))
         assert run.returncode == 0, f"{run.stdout}{run.stderr}"
+
+    def console(self, text: str) -> None:
+        for command, output in re.findall(r"^\$ (.*)\n((?:[^$].*\n|\n)*)", text, re.MULTILINE):
+            expected = [1] if output.startswith("nodectl: ") else [0, DIFFERENCE] if " diff " in command else [0]
+            run = self._bash(command)
+            assert run.returncode in expected, f"{command}\n{run.stdout}{run.stderr}"
 
     def text(self, text: str) -> None:
         for line in text.splitlines():
@@ -112,6 +127,51 @@ def test_commands_are_tagged():
             assert not untagged, f"{document.name}: {untagged}"
 
 
+def commands(document: Path) -> list[str]:
+    """The commands of `nodectl` in a document, in blocks and in the text, without comments and placeholders."""
+    text = document.read_text(encoding="utf-8").replace("cargo run -q -p nodectl --", "nodectl").replace("\\\n", " ")
+    lines = re.findall(r"^(?:\$ )?(nodectl [^\n]*)", "\n".join(re.findall(r"^```.*?^```", text, re.M | re.S)), re.M)
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    inline = [re.sub(r"\s+", " ", command) for command in re.findall(r"`(nodectl [^`]+)`", text)]
+    found = [re.sub(r"\s+(#|>|&&|\|) .*", "", command).strip() for command in lines + inline]
+    return [command for command in found if not re.search(r"…|\.\.\.|\b[A-Z]{3,}\b|\[", command)]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: document.name)
+def test_commands_are_understood(document: Path):
+    """Without a bus a command ends with exit code 4, or 7 without its file, and a wrong one with 2."""
+    environment = {**os.environ, "NODECTL_BUS": "socketcand://127.0.0.1:9/none"}
+    wrong = []
+    for command in commands(document):
+        arguments = shlex.split(command)[1:]
+        if {"serve", "man", "completions", "explain"} & set(arguments):
+            continue
+        command_line = [os.environ["NODECTL_COMMAND"], *arguments]
+        run = subprocess.run(command_line, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE)
+        is_mention = re.search("required arguments were not provided|a value is required", run.stderr) or len(arguments) == 1
+        if run.returncode == 2 and not is_mention:
+            wrong.append((command, run.stderr.splitlines()[:1]))
+    assert not wrong
+
+
+def test_commands_of_the_project_exist():
+    source = (ROOT / "xtask/src/main.rs").read_text(encoding="utf-8")
+    variants = re.findall(r"^    ([A-Z][A-Za-z]+)(?: \{|\(|,)", source, re.MULTILINE)
+    known = {re.sub(r"(?<!^)(?=[A-Z])", "-", variant).lower() for variant in variants}
+    for document in DOCUMENTS:
+        named = set(re.findall(r"cargo xtask ([a-z][a-z-]+)", document.read_text(encoding="utf-8")))
+        assert named <= known, document.name
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: document.name)
+def test_paths_exist(document: Path):
+    """Paths from the root of the repository, in code. A brace or a star stands for several files."""
+    text = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    folders = "bench|bootloader|crates|docs|eds|emulator|firmware|host-tests|tools|xtask"
+    named = re.findall(rf"`((?:{folders})/[\w./-]+)`", text)
+    assert not [path for path in named if not (ROOT / path).exists() and not EXAMPLE.search(path)]
+
+
 def anchors(text: str) -> set[str]:
     """The anchors of the headings, as GitHub makes them."""
     text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
@@ -138,6 +198,16 @@ def test_links_lead_to_files_and_headings(document: Path):
         if not target.exists() or (anchor and anchor not in anchors(target.read_text(encoding="utf-8"))):
             broken.append(link)
     assert not broken
+
+
+def test_drawings_are_shown_and_described():
+    shown = {(document.parent / link).resolve() for document in DOCUMENTS for link in links(document)}
+    for drawing in sorted((ROOT / "docs" / "drawings").glob("*.svg")):
+        root = ElementTree.parse(drawing).getroot()
+        described = {element.tag.rpartition("}")[2] for element in root if element.text}
+        assert {"title", "desc", "style"} <= described, drawing.name
+        assert "prefers-color-scheme: dark" in drawing.read_text(encoding="utf-8"), drawing.name
+        assert drawing in shown, drawing.name
 
 
 def test_the_error_budget_is_that_of_its_circuits():
