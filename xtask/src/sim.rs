@@ -29,6 +29,9 @@ fn build_all(chip: &str) -> Result<PathBuf> {
     })
 }
 
+/// The stimuli of a call without flags: a slow pressure and a slower temperature, so that the values of the first look move.
+const MOVING: [&str; 4] = ["--pressure", "sine:250000,100000,0.05", "--temperature", "sine:298.15,5,0.02"];
+
 /// The chip that the flags name. The simulator itself refuses an unknown name.
 fn chip(flags: &[OsString]) -> &str {
     let mut flags = flags.iter().filter_map(|flag| flag.to_str());
@@ -47,7 +50,12 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     eprintln!("images for development: the bootloader starts what nobody has signed (docs/update.md)");
     let images = build_all(chip(flags))?;
     images::sign(Command::new(built("sign")), &images)?;
-    become_program(with_images(&built("sim"), &images).args(flags))
+    let mut simulator = with_images(&built("sim"), &images);
+    if flags.is_empty() {
+        eprintln!("pressure and temperature move slowly; `cargo sim --pressure const:250000` holds them");
+        simulator.args(MOVING);
+    }
+    become_program(simulator.args(flags))
 }
 
 /// The call of the simulator with the two ELF files and the program that serves the page. The page has a program of its
