@@ -6,14 +6,18 @@ use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::Attributes;
 use super::limits::Limits;
 use super::tables::{Place, Series};
-use super::{Counts, DefaultValue, Group, Object, Rule, image_size};
+use super::{Counts, DefaultValue, Group, Object, Rule, check, image_size};
 
-/// Tables of maximum size, and the number of used elements.
-pub(super) struct TableBuilder {
+/// Tables of maximum size, and the number of used elements. The compiler evaluates it once for all dictionaries of a
+/// program, and it is in no image.
+#[derive(Debug)]
+pub struct TableBuilder {
     pub(super) series: [Series; MAX],
     pub(super) places: [Place; MAX],
     pub(super) attributes: [Attributes; MAX_ATTRIBUTES],
     pub(super) defaults: [u8; MAX_DEFAULTS],
+    /// The end of the series of each dictionary.
+    pub(super) ends: [u16; MAX_DICTIONARIES],
     pub(super) used: Counts,
 }
 
@@ -21,14 +25,38 @@ pub(super) struct TableBuilder {
 const MAX: usize = 1024;
 /// The maximum number of default bytes: the size of the largest image.
 const MAX_DEFAULTS: usize = 1 << 16;
+/// The maximum number of dictionaries.
+const MAX_DICTIONARIES: usize = 64;
 /// The maximum number of attributes: a place refers to its attributes by one byte.
 const MAX_ATTRIBUTES: usize = 256;
 
 #[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
 #[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
 impl TableBuilder {
+    /// The tables of these tables of rows.
+    ///
+    /// # Panics
+    /// During compilation, when a table is wrong: see [`check`].
+    #[must_use]
+    pub const fn of(all: &[&[Object]]) -> TableBuilder {
+        let (mut builder, mut i) = (TableBuilder::new(&all[0][0]), 0);
+        while i < all.len() {
+            check(all[i]);
+            builder.add(all[i]);
+            builder.ends[i] = builder.used.series as u16;
+            i += 1;
+        }
+        builder
+    }
+
+    /// The sizes of the tables.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.used
+    }
+
     /// The tables of no rows yet. `any` is a row to fill the unused elements with.
-    pub(super) const fn new(any: &Object) -> TableBuilder {
+    const fn new(any: &Object) -> TableBuilder {
         TableBuilder {
             series: [Series {
                 index: 0,
@@ -42,12 +70,13 @@ impl TableBuilder {
             places: [Place { sub: 0, attributes: 0, offset: 0 }; MAX],
             attributes: [attributes(any); MAX_ATTRIBUTES],
             defaults: [0; MAX_DEFAULTS],
+            ends: [0; MAX_DICTIONARIES],
             used: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
         }
     }
 
     /// Adds a table of rows.
-    pub(super) const fn add(&mut self, rows: &[Object]) {
+    const fn add(&mut self, rows: &[Object]) {
         let (mut row, mut offset) = (0, 0);
         while row < rows.len() {
             let entries = object_len(rows, row);
@@ -124,9 +153,14 @@ impl TableBuilder {
     const fn write_defaults(&mut self, rows: &[Object]) -> usize {
         let (mut at, mut defaults_len, mut row) = (0, 0, 0);
         while row < rows.len() {
-            let mut i = 0;
-            while i < rows[row].stored_size() {
-                let byte = default_byte(rows[row].default, i);
+            let (default, size, mut i) = (rows[row].default, rows[row].stored_size(), 0);
+            let word = default_word(default);
+            while i < size {
+                let byte = match default {
+                    DefaultValue::Text(text) if i < text.len() => text.as_bytes()[i],
+                    DefaultValue::Text(_) | DefaultValue::None => 0,
+                    _ => word[i],
+                };
                 self.defaults[self.used.defaults + at] = byte;
                 (at, i) = (at + 1, i + 1);
                 defaults_len = if byte == 0 { defaults_len } else { at };
@@ -217,12 +251,12 @@ pub(super) const fn attributes(row: &Object) -> Attributes {
     }
 }
 
-const fn default_byte(value: DefaultValue, i: usize) -> u8 {
+/// The bytes of a default of at most eight bytes; zeros for another one.
+const fn default_word(value: DefaultValue) -> [u8; 8] {
     match value {
-        DefaultValue::Integer(value) => value.to_le_bytes()[i],
-        DefaultValue::Real(value) => value.to_le_bytes()[i],
-        DefaultValue::NodeId(base) => base.to_le_bytes()[i],
-        DefaultValue::Text(text) if i < text.len() => text.as_bytes()[i],
-        DefaultValue::Text(_) | DefaultValue::None => 0,
+        DefaultValue::Integer(value) => value.to_le_bytes(),
+        DefaultValue::Real(value) => (value.to_bits() as u64).to_le_bytes(),
+        DefaultValue::NodeId(base) => (base as u64).to_le_bytes(),
+        DefaultValue::Text(_) | DefaultValue::None => [0; 8],
     }
 }

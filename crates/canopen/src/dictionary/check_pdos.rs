@@ -38,13 +38,13 @@ const fn check_communication(rows: &[Object], row: &Object) {
     let Some(transmission) = Transmission::parse(default_byte(kind)) else {
         fail(kind.index, 2, "the transmission types 241 to 251 are reserved");
     };
-    require(
+    require!(
         !transmission.is_synchronous() || find(rows, 0x1005, 0).is_some(),
         kind,
         "the transmission type needs SYNC, and the table has no 1005h",
     );
     let needs_remote = transmission.needs_remote();
-    require(is_sent(row) || !needs_remote, kind, "an RPDO has no transmission type 252 or 253");
+    require!(is_sent(row) || !needs_remote, kind, "an RPDO has no transmission type 252 or 253");
     // The COB-IDs with the lowest and with the highest node-ID.
     let (first, last) = match id.default {
         DefaultValue::NodeId(base) => (base.wrapping_add(1), base.wrapping_add(127)),
@@ -59,12 +59,12 @@ const fn check_communication(rows: &[Object], row: &Object) {
     }
     let is_own = matches!(id.rule, Rule::PdoPredefined);
     let is_free = !first.id.is_restricted() && !last.id.is_restricted();
-    require(is_own || is_free, id, "the CAN-ID is reserved for another service");
-    require(!first.bit30 || !needs_remote, kind, "the transmission type needs remote frames");
+    require!(is_own || is_free, id, "the CAN-ID is reserved for another service");
+    require!(!first.bit30 || !needs_remote, kind, "the transmission type needs remote frames");
     let mapped = default_byte(count);
-    require(mapped > 0, count, "the PDO is valid, but maps no object");
+    require!(mapped > 0, count, "the PDO is valid, but maps no object");
     let is_multiplexed = Addressing::from_count(mapped).is_some();
-    require(
+    require!(
         !is_multiplexed || transmission.is_event_driven(),
         kind,
         "a multiplexed PDO has the transmission type 254 or 255",
@@ -76,12 +76,12 @@ const fn check_communication(rows: &[Object], row: &Object) {
 const fn check_mapping(rows: &[Object], at: usize) {
     let row = &rows[at];
     let has_parameter = find(rows, row.index & !MAPPING, 0).is_some();
-    require(has_parameter, row, "the mapping parameter has no communication parameter");
+    require!(has_parameter, row, "the mapping parameter has no communication parameter");
     let mut count = default_byte(row);
     if Addressing::from_count(count).is_some() {
         count = 0;
     }
-    require(count <= 64, row, "a PDO maps at most 64 objects");
+    require!(count <= 64, row, "a PDO maps at most 64 objects");
     // The mapping entries follow in the order of their sub-indexes.
     let (mut slot, mut entries, mut bits) = (at + 1, 0, 0);
     while slot < rows.len() && rows[slot].index == row.index {
@@ -97,7 +97,7 @@ const fn check_mapping(rows: &[Object], at: usize) {
         }
         fail(row.index, missing, "the PDO maps more objects than it has entries");
     }
-    require(bits <= 64, row, "the mapped objects have more than eight bytes");
+    require!(bits <= 64, row, "the mapped objects have more than eight bytes");
 }
 
 /// Checks a mapping entry. Returns the length of the object in bits.
@@ -113,7 +113,7 @@ const fn check_slot(rows: &[Object], slot: &Object, is_used: bool) -> u8 {
     if !is_sent(slot)
         && let Some(size) = mapped.dummy_size()
     {
-        require(mapped.bits == size * 8, slot, "the dummy object has another length");
+        require!(mapped.bits == size * 8, slot, "the dummy object has another length");
         return mapped.bits;
     }
     let Some(object) = find(rows, mapped.index, mapped.sub) else {
@@ -121,8 +121,8 @@ const fn check_slot(rows: &[Object], slot: &Object, is_used: bool) -> u8 {
     };
     let object = &rows[object];
     let allows = if is_sent(slot) { object.mapping.allows_tpdo() } else { object.mapping.allows_rpdo() };
-    require(allows, slot, "the mapped object cannot be mapped in this direction");
-    require(
+    require!(allows, slot, "the mapped object cannot be mapped in this direction");
+    require!(
         mapped.bits as u16 == object.kind.size() as u16 * 8,
         slot,
         "the mapped object has another length",

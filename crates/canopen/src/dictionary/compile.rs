@@ -2,7 +2,7 @@
 #![allow(clippy::indexing_slicing, clippy::expect_used, reason = "evaluated by the compiler")]
 
 use super::builder::{TableBuilder, is_alike, larger};
-use super::{Access, Dictionary, Object, Services, Tables, Type, check};
+use super::{Access, Dictionary, Object, Services, Tables, Type};
 
 /// The number of rows in all parts of a table.
 #[must_use]
@@ -64,15 +64,14 @@ macro_rules! dictionaries {
         // The expression `$all` must not use any of these names.
         const ROWS_OF_ALL: &[&[make::Object]] = &$all;
         #[allow(long_running_const_eval)]
-        const ROOM: make::Counts = make::Counts::of(ROWS_OF_ALL);
-        #[allow(long_running_const_eval)]
+        const BUILT: make::TableBuilder = make::TableBuilder::of(ROWS_OF_ALL);
         static COMPILED_TABLES: make::Tables<
             { ROWS_OF_ALL.len() },
-            { ROOM.series },
-            { ROOM.places },
-            { ROOM.attributes },
-            { ROOM.defaults },
-        > = make::compile(&$all);
+            { BUILT.counts().series },
+            { BUILT.counts().places },
+            { BUILT.counts().attributes },
+            { BUILT.counts().defaults },
+        > = make::compile(&BUILT);
         COMPILED_TABLES.dictionaries()
     }};
 }
@@ -90,45 +89,20 @@ pub struct Counts {
     pub defaults: usize,
 }
 
-impl Counts {
-    /// The sizes for the dictionaries of these tables of rows.
-    ///
-    /// # Panics
-    /// During compilation, when a table is wrong: see [`check`](super::check).
-    #[must_use]
-    pub const fn of(all: &[&[Object]]) -> Counts {
-        let (mut builder, mut i) = (TableBuilder::new(&all[0][0]), 0);
-        while i < all.len() {
-            check(all[i]);
-            builder.add(all[i]);
-            i += 1;
-        }
-        builder.used
-    }
-}
-
-/// Compiles the run-time tables of several tables of rows. The parameters are at least the fields of [`Counts`].
+/// The run-time tables of several tables of rows. The parameters are the number of tables and the fields of [`Counts`].
 ///
 /// # Panics
-/// During compilation, when a parameter is too small.
+/// During compilation, when a parameter is too large.
 #[must_use]
-#[allow(clippy::cast_possible_truncation)] // `MAX` is less than 2^16.
 pub const fn compile<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize>(
-    all: &[&[Object]; D],
+    built: &TableBuilder,
 ) -> Tables<D, S, P, A, V> {
-    let (mut builder, mut ends, mut i) = (TableBuilder::new(&all[0][0]), [0; D], 0);
-    while i < D {
-        builder.add(all[i]);
-        ends[i] = builder.used.series as u16;
-        i += 1;
-    }
-    let TableBuilder { series, places, attributes, defaults, .. } = builder;
     Tables {
-        series: beginning(&series),
-        places: beginning(&places),
-        attributes: beginning(&attributes),
-        defaults: beginning(&defaults),
-        ends,
+        series: beginning(&built.series),
+        places: beginning(&built.places),
+        attributes: beginning(&built.attributes),
+        defaults: beginning(&built.defaults),
+        ends: beginning(&built.ends),
     }
 }
 
@@ -253,21 +227,15 @@ impl Sizes {
     /// The room that these rows need.
     #[must_use]
     pub const fn of(rows: &[Object]) -> Sizes {
-        let (image, services) = (image_size(rows), Services::of(rows));
-        let mut sizes = Sizes { image, tpdos: 0, rpdos: 0, watches: 0, scanned: 0, servers: 0, services };
-        let (mut i, mut is_multiplexed) = (0, false);
-        while i < rows.len() {
-            let row = &rows[i];
-            sizes.tpdos += (row.sub == 0 && row.index & 0xFE00 == 0x1800) as usize;
-            sizes.rpdos += (row.sub == 0 && row.index & 0xFE00 == 0x1400) as usize;
-            sizes.watches += (row.sub > 0 && row.index == 0x1016) as usize;
-            sizes.servers += (row.sub == 0 && row.index > 0x1200 && row.index < 0x1280) as usize;
-            sizes.scanned += (row.mapping.allows_tpdo() && row.kind.size() <= 4) as usize;
-            is_multiplexed |= row.sub == 0 && row.index & 0xFE00 == 0x1A00 && can_be_multiplexed(row);
-            i += 1;
+        Sizes {
+            image: image_size(rows),
+            tpdos: pdos(rows, 0x1800),
+            rpdos: pdos(rows, 0x1400),
+            watches: watches(rows),
+            scanned: scanned(rows),
+            servers: servers(rows),
+            services: Services::of(rows),
         }
-        sizes.scanned = if is_multiplexed { sizes.scanned } else { 0 };
-        sizes
     }
 
     /// The room that is enough for each of several tables.
@@ -302,6 +270,75 @@ impl Sizes {
             && self.servers <= room.servers
             && room.services.contains(self.services)
     }
+}
+
+/// The positions of the rows with indexes from `first` to `last`.
+const fn within(rows: &[Object], first: u16, last: u16) -> (usize, usize) {
+    (before(rows, first), before(rows, last.saturating_add(1)))
+}
+
+/// The number of rows before an index.
+const fn before(rows: &[Object], index: u16) -> usize {
+    let (mut low, mut high) = (0, rows.len());
+    while low < high {
+        let middle = low.midpoint(high);
+        if rows[middle].index < index {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+/// The number of objects with indexes from `first` to `last`.
+const fn objects(rows: &[Object], first: u16, last: u16) -> usize {
+    let ((mut i, end), mut objects) = (within(rows, first, last), 0);
+    while i < end {
+        objects += (rows[i].sub == 0) as usize;
+        i += 1;
+    }
+    objects
+}
+
+/// The number of TPDOs (1800h) or RPDOs (1400h).
+#[doc(hidden)]
+#[must_use]
+pub const fn pdos(rows: &[Object], first: u16) -> usize {
+    objects(rows, first, first + 0x1FF)
+}
+
+/// The number of heartbeats that can be monitored.
+#[doc(hidden)]
+#[must_use]
+pub const fn watches(rows: &[Object]) -> usize {
+    let (begin, end) = within(rows, 0x1016, 0x1016);
+    (end - begin).saturating_sub(1)
+}
+
+/// The number of SDO servers beside the default one.
+#[doc(hidden)]
+#[must_use]
+pub const fn servers(rows: &[Object]) -> usize {
+    objects(rows, 0x1201, 0x127F)
+}
+
+/// The number of objects that a multiplexed TPDO can send; 0 if no TPDO can be multiplexed.
+#[doc(hidden)]
+#[must_use]
+pub const fn scanned(rows: &[Object]) -> usize {
+    let ((mut i, end), mut is_multiplexed) = (within(rows, 0x1A00, 0x1BFF), false);
+    while i < end {
+        is_multiplexed |= rows[i].sub == 0 && can_be_multiplexed(&rows[i]);
+        i += 1;
+    }
+    let mut scanned = 0;
+    i = 0;
+    while is_multiplexed && i < rows.len() {
+        scanned += (rows[i].mapping.allows_tpdo() && rows[i].kind.size() <= 4) as usize;
+        i += 1;
+    }
+    scanned
 }
 
 /// Whether the number of mapped objects can be 254 or 255.
@@ -352,7 +389,16 @@ macro_rules! definition {
         >
     };
     ($application:ty, $rows:expr) => {
-        $crate::definition!($application, room: $crate::dictionary::Sizes::of($rows))
+        $crate::plumbing::Rows<
+            $application,
+            { $crate::dictionary::image_size($rows) },
+            { $crate::dictionary::pdos($rows, 0x1800) },
+            { $crate::dictionary::pdos($rows, 0x1400) },
+            { $crate::dictionary::watches($rows) },
+            { $crate::dictionary::scanned($rows) },
+            { $crate::dictionary::servers($rows) },
+            { $crate::dictionary::Services::of($rows).bits() },
+        >
     };
 }
 

@@ -1,8 +1,6 @@
 //! Compile errors that name the row: `1A00h:1: the mapped object is not in the table`.
 #![allow(clippy::indexing_slicing, clippy::panic, reason = "evaluated by the compiler")]
 
-use super::Object;
-
 /// The longest message. A longer one is cut.
 const ROOM: usize = 160;
 
@@ -62,12 +60,14 @@ pub(crate) const fn fail(index: u16, sub: u8, message: &str) -> ! {
     }
 }
 
-/// Stops the compilation unless the condition holds for the row.
-///
-/// # Panics
-/// When the condition does not hold.
-pub(super) const fn require(condition: bool, row: &Object, message: &str) {
-    if !condition {
-        fail(row.index, row.sub, message);
-    }
+/// Stops the compilation unless the condition holds for the row. A macro, because the compiler evaluates a call much
+/// slower than a condition, and there are a dozen conditions for each row.
+macro_rules! require {
+    ($condition:expr, $row:expr, $message:expr $(,)?) => {
+        if !$condition {
+            $crate::dictionary::fail($row.index, $row.sub, $message);
+        }
+    };
 }
+
+pub(super) use require;

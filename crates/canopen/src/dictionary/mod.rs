@@ -25,8 +25,10 @@ mod tables;
 mod transmission;
 mod types;
 
+#[doc(hidden)]
+pub use builder::TableBuilder;
 pub use check::check;
-pub use compile::{Counts, Sizes, compile, count, gather, image_size};
+pub use compile::{Counts, Sizes, compile, count, gather, image_size, pdos, scanned, servers, watches};
 pub use entry::Entry;
 pub(crate) use entry::little_endian;
 pub(crate) use fail::fail;

@@ -78,7 +78,7 @@ fn rows() -> Vec<Object> {
 fn node() -> (&'static Dictionary, Box<Node>) {
     let rows = rows();
     let tables: &'static Tables<1, 64, 256, 64, 65_000> =
-        Box::leak(Box::new(dictionary::compile(&[rows.as_slice()])));
+        Box::leak(Box::new(dictionary::compile(&dictionary::TableBuilder::of(&[rows.as_slice()]))));
     let [dictionary] = tables.dictionaries();
     let dictionary: &'static Dictionary = Box::leak(Box::new(dictionary));
     let mut node = Box::new(Node::new(dictionary, NodeId::new(ID), Recorder::default()));
