@@ -97,7 +97,7 @@ fn profiles() -> Vec<Switch> {
         fault("has an alarm in one object and none in the other", &["P404-09"], reads(0x6600, 1, &[1])),
         fault("is an encoder and does not say so", &["P406-01"], reads(0x1000, 0, &[0, 0, 0, 0])),
         fault("is an encoder without operating parameters", &["P406-02"], lacks(&[0x6000])),
-        fault("is an encoder without a position", &["P406-03"], lacks(&[0x6004])),
+        fault("is an encoder without a position", &["P406-03"], lacks(&[0x6004, 0x6020])),
         fault("is an encoder without an operating status", &["P406-04"], lacks(&[0x6500])),
         fault("is an encoder without a resolution", &["P406-05"], lacks(&[0x6501])),
         fault("is an encoder without a number of revolutions", &["P406-06"], lacks(&[0x6502])),
