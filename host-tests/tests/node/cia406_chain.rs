@@ -47,11 +47,13 @@ fn parameters(cells: &[&str]) -> Parameters {
         panic!()
     };
     let direction = if kind(code).is_linear() { DIRECTION } else { CODE_SEQUENCE };
+    // The golden positions without scaling are in the steps of the sensor.
+    let is_native = kind(code).is_linear() && scaling == "0";
     Parameters {
         operating: (number::<u16>(scaling) * SCALING) | (number::<u16>(reversed) * direction),
         per_revolution: number(per_revolution),
         range: number(range),
-        step: number(step),
+        step: number(if is_native { resolution } else { step }),
         format: format(&cells[3..8]),
         ..with_sensor(kind(code), resolution, counted)
     }

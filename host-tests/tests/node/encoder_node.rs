@@ -285,14 +285,19 @@ fn a_digital_input_makes_a_preset_that_outlives_a_loss_of_power() {
     turn_to(&mut bench, 500);
     bench.write(0x2115, 1, &[1]).unwrap();
     bench.write(0x6003, 0, &7000_u32.to_le_bytes()).unwrap();
+    turn_to(&mut bench, 500);
     turn_to(&mut bench, 600);
     wait(&mut bench, 5);
     assert_eq!(number(&mut bench, 0x6004, 0), 7100, "it was pressed when it was chosen");
     bench.buttons = [false, false];
     wait(&mut bench, 5);
+    // As in the firmware, the store waits for the sample that has the new offset.
+    bench.stores_later = true;
     bench.buttons = [true, true];
     turn_to(&mut bench, 700);
     wait(&mut bench, 150);
+    let job = bench.begin_store().expect("a preset is stored");
+    bench.end_store(job);
     assert_eq!((number(&mut bench, 0x6004, 0), number(&mut bench, 0x6020, 1)), (7000, 7000));
     turn_to(&mut bench, 750);
     wait(&mut bench, 150);

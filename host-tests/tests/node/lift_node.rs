@@ -116,6 +116,9 @@ fn every_object_that_can_be_mapped_is_sent_on_entering_operational() {
     let off: Vec<_> = [0x2303, 0x6383, 0x63C0, 0x63C5]
         .into_iter()
         .flat_map(|index| (2..=4).map(move |sub| (index, sub)))
+        .chain((0x63B1..=0x63B3).map(|index| (index, 1)))
+        // Each change of a speed would be a frame.
+        .chain((1..=4).map(|sub| (0x6390, sub)))
         .collect();
     let rows = table(Personality::Lift).into_iter().filter(|row| row.mapping == "tpdo");
     let expected: BTreeSet<_> = rows.map(|row| (row.index, row.sub)).filter(|at| !off.contains(at)).collect();

@@ -119,6 +119,13 @@ impl Sheet {
         }
     }
 
+    /// Whether the default of the object is another value of the node, as the span of a pressure (6148h, 6149h), which is
+    /// the range of its calibration.
+    pub(crate) fn follows_calibration(sheet: Option<&Sheet>, key: Key) -> bool {
+        let is_span = matches!(key, (0x6148 | 0x6149 | 0x6948 | 0x6949, 1));
+        is_span && sheet.is_some_and(|sheet| sheet.entries.contains_key(&(0x2200, 1)))
+    }
+
     /// Whether CiA 301 and CiA 302 define the object as a communication parameter of every device.
     #[must_use]
     pub fn is_communication_parameter(key: Key) -> bool {

@@ -136,6 +136,10 @@ impl Values {
             // An aborted download may have acted before the value was known: then nothing can be said.
             return;
         };
+        let has_default = event == Event::Restored || held.saved == Saved::Default;
+        if has_default && Sheet::follows_calibration(self.sheet.as_ref(), key) {
+            return;
+        }
         let (was, is) = (hex(&before), hex(bytes));
         let (index, sub) = key;
         let mut report = |rule, text: String| findings.push((rule, format!("{index:04X}h:{sub} {text}")));

@@ -123,7 +123,7 @@ impl Catalogue {
     /// `zero`) for an object of four bytes. `None` for any other text.
     #[must_use]
     pub fn word(&self, at: Multiplexer, text: &str) -> Option<Value> {
-        const SIGNATURES: [&str; 5] = ["save", "load", "zero", "cali", "fact"];
+        const SIGNATURES: [&str; 6] = ["save", "load", "zero", "tare", "cali", "fact"];
         let entry = self.entry(at).filter(|entry| entry.data_type == DataType(0x07))?;
         if entry.name.to_lowercase().contains("physical unit") {
             return unit::code(text).map(|code| Value::Integer(code.into()));

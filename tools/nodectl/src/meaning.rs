@@ -28,7 +28,12 @@ pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<Strin
 
 /// Status of an analogue input (CiA 404, 6150h).
 fn status(bits: i128) -> String {
-    let words = [(1, "not valid"), (2, "positive overload"), (4, "negative overload")];
+    let words: [(i128, &str); 4] = [
+        (1, "not valid"),
+        (2, "positive overload"),
+        (4, "negative overload"),
+        (8, "no temperature compensation"),
+    ];
     let set: Vec<&str> = words.into_iter().filter(|(bit, _)| bits & bit != 0).map(|(_, word)| word).collect();
     if set.is_empty() { "valid".to_owned() } else { set.join(", ") }
 }

@@ -249,6 +249,10 @@ impl Session {
         let code = error.abort()?.0;
         let catalogue = self.catalogues.get(&error.node);
         match (code, error.at.index) {
+            (0x0609_0030, 0x1800..=0x19FF) if error.at.sub == 3 => Some(format!(
+                "the inhibit time is changed while the PDO is switched off (bit 31 of {:04X}h:1)",
+                error.at.index
+            )),
             (0x0609_0030..=0x0609_0032, _) => {
                 catalogue?.range(error.at, error.node).map(|range| format!("it takes {range}"))
             }
@@ -259,8 +263,8 @@ impl Session {
                      empty (sub-index 0 is 0)"
                 ))
             }
-            (0x0800_0022, 0x6125 | 0x6925) => {
-                let status = 0x6150 + (error.at.index - 0x6125);
+            (0x0800_0022, 0x6125 | 0x6925 | 0x6139 | 0x6939) => {
+                let status = 0x6150 | (error.at.index & 0x0800);
                 Some(format!(
                     "the process value is not valid: see the status, {status:04X}h:{}",
                     error.at.sub
@@ -270,7 +274,7 @@ impl Session {
                 "the calibration is locked; `nodectl write 2203 cali` opens it until the next reset"
                     .to_owned(),
             ),
-            (0x0601_0000, 0x2107) if catalogue?.is_of_this_project() => Some(
+            (0x0800_0022, 0x2107) if catalogue?.is_of_this_project() => Some(
                 "the factory data are locked; `nodectl write 2108 fact` opens them until the next reset"
                     .to_owned(),
             ),

@@ -23,7 +23,15 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("P406-07", "6500h shows the operating parameters of 6000h", "CiA 406, object 6500h", status)
         .recommended(),
     Check::new("P406-08", "The position value cannot be written", "CiA 406, object 6004h", read_only),
+    Check::new("P406-09", "6030h has as many channels as 6020h", "CiA 406, object 6030h", speeds),
 ];
+
+fn speeds(s: &mut Subject<'_>) -> Outcome {
+    s.need(0x6030, 1)?;
+    s.need(0x6020, 1)?;
+    let channels = s.number(0x6020, 0)?;
+    s.holds(0x6030, 0, channels)
+}
 
 fn position(s: &mut Subject<'_>) -> Outcome {
     one_is_sent(s, &[(0x6004, 0), (0x6020, 1)], "a position value")

@@ -31,7 +31,25 @@ pub(super) const CHECKS: &[Check] = &[
         "CiA 404-1, AI function block",
         channels,
     ),
+    Check::new("P404-08", "6139h: autotare refuses another signature", "CiA 404-1, AI autotare", signature),
+    Check::new("P404-09", "6600h:1 has the alarm states of 650Dh", "CiA 404-1, alarm function block", alarms),
 ];
+
+fn signature(s: &mut Subject<'_>) -> Outcome {
+    s.need(0x6139, 1)?;
+    let codes = [abort::NOT_STORED, abort::VALUE, abort::TOO_HIGH, abort::TOO_LOW];
+    s.refuses_bytes(0x6139, 1, &[0; 4], &codes)
+}
+
+fn alarms(s: &mut Subject<'_>) -> Outcome {
+    s.need(0x6600, 1)?;
+    let mut states = 0;
+    for alarm in 1..=8 {
+        let state = s.optional(0x650D, alarm)?.unwrap_or(0);
+        states |= (state & 1) << (alarm - 1);
+    }
+    s.holds(0x6600, 1, states)
+}
 
 fn value(s: &mut Subject<'_>) -> Outcome {
     one_is_sent(s, &[(0x6130, 1), (0x7130, 1), (0x9130, 1)], "a process value")

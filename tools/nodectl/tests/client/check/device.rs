@@ -104,7 +104,7 @@ type Table = (&'static [Object], &'static Dictionary);
 
 const NOTHING: [Object; 0] = [];
 
-const MEASURING: [Object; 12] = [
+const MEASURING: [Object; 18] = [
     Object::highest(0x6110, 1, "Sensor type"),
     own_at(0x6110, 1, Type::Unsigned16),
     Object::highest(0x6130, 1, "Process value"),
@@ -117,20 +117,36 @@ const MEASURING: [Object; 12] = [
     input(0x6150, 1, Type::Unsigned8),
     Object::highest(0x6100, 1, "Field value"),
     input(0x6100, 1, Type::Real32),
+    Object::highest(0x6139, 1, "Autotare"),
+    Object::new(0x6139, 1, "Autotare", Type::Unsigned32, Access::WriteOnly).handled(),
+    Object::highest(0x650D, 1, "Alarm state"),
+    input(0x650D, 1, Type::Unsigned8),
+    Object::highest(0x6600, 1, "Alarm states"),
+    input(0x6600, 1, Type::Unsigned8),
 ];
 
-const ENCODER: [Object; 5] = [
+const ENCODER: [Object; 9] = [
     own(0x6000, Type::Unsigned16).value(4),
     input(0x6004, 0, Type::Unsigned32),
+    Object::highest(0x6020, 1, "Positions"),
+    input(0x6020, 1, Type::Integer32),
+    Object::highest(0x6030, 1, "Speeds"),
+    input(0x6030, 1, Type::Integer16),
     fixed(0x6500, 0, Type::Unsigned16, 4),
     fixed(0x6501, 0, Type::Unsigned32, 8192),
     fixed(0x6502, 0, Type::Unsigned16, 4096),
 ];
 
-const LIFT: [Object; 3] = [
+const LIFT: [Object; 9] = [
     Object::highest(0x6000, 1, "Virtual devices"),
     fixed(0x6000, 1, Type::Unsigned16, 1),
     own(0x6001, Type::Unsigned8),
+    Object::highest(0x63B0, 1, "Area state"),
+    input(0x63B0, 1, Type::Unsigned8),
+    Object::highest(0x63B4, 1, "Low limit"),
+    own_at(0x63B4, 1, Type::Integer32),
+    Object::highest(0x63B8, 1, "High limit"),
+    own_at(0x63B8, 1, Type::Integer32),
 ];
 
 const IO: [Object; 8] = [
@@ -170,8 +186,9 @@ pub(super) struct App {
 }
 
 impl Application for App {
-    fn write(&mut self, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), canopen::sdo::Abort> {
-        Ok(())
+    fn write(&mut self, entry: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), canopen::sdo::Abort> {
+        let is_signed = entry.index() != 0x6139 || bytes == b"tare";
+        if is_signed { Ok(()) } else { Err(canopen::sdo::Abort::NotStored) }
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {

@@ -45,6 +45,7 @@ pub(super) fn switches() -> Vec<Switch> {
         }),
         misprint("declares a position that no PDO can carry", &["P406-03"], |sheet| {
             entry(sheet, 0x6004, 0).mappable = false;
+            entry(sheet, 0x6020, 1).mappable = false;
         }),
         misprint("is a lift device without a PDO", &["P417-05"], |sheet| {
             sheet.objects.retain(|index, _| !matches!(index, 0x1400..=0x1BFF));
