@@ -11,8 +11,8 @@ use sim::world::World;
 
 mod adapter;
 mod desk;
-mod probe;
 pub mod faults;
+mod probe;
 
 pub use adapter::{Adapter, Shared};
 pub use desk::{EmulatedDesk, Mistake};

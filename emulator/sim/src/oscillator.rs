@@ -47,9 +47,9 @@ impl FromStr for Lsi {
 
     fn from_str(text: &str) -> Result<Lsi, String> {
         let hertz = text.parse().ok().filter(|hertz| LSI.contains(hertz));
-        hertz.map(Lsi).ok_or_else(|| {
-            format!("{text:?} is no frequency of an LSI: {} to {} Hz", LSI.start(), LSI.end())
-        })
+        hertz
+            .map(Lsi)
+            .ok_or_else(|| format!("{text:?} is no frequency of an LSI: {} to {} Hz", LSI.start(), LSI.end()))
     }
 }
 

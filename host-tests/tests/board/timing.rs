@@ -239,9 +239,6 @@ fn every_task_ends_before_its_deadline() {
             own.response
         );
     }
-    assert!(
-        tasks[TRANSMIT].1.worst > tasks[0].1.worst,
-        "to receive a frame takes longer than to send one"
-    );
+    assert!(tasks[TRANSMIT].1.worst > tasks[0].1.worst, "to receive a frame takes longer than to send one");
     assert!((0..tasks.len()).all(|place| response(&tasks, place).is_some()), "a task can be late");
 }

@@ -124,5 +124,4 @@ pub const SELF_TEST_KEY: u32 = u32::from_be_bytes(*b"\0tes");
 
 /// 2005h: the key with a number in the lowest byte; an upload after that has the value of the board with this number.
 /// docs/board.md has the numbers.
-pub const SELF_TEST_ROW: Object =
-    Object::new(SELF_TEST, 0, "Self-test", Type::Unsigned32, Access::ReadWrite);
+pub const SELF_TEST_ROW: Object = Object::new(SELF_TEST, 0, "Self-test", Type::Unsigned32, Access::ReadWrite);

@@ -14,7 +14,11 @@ const BOOTLOADER: usize = 32 * 1024;
 fn a_protected_board_is_updated_to_b_and_back() {
     let world = boards(1);
     let before = world.borrow_mut().machine(0).flash();
-    program(&mut Probe(&mut world.borrow_mut()), OptionBytes::FACTORY.with_bootloader(true).with_read_out(true)).unwrap();
+    program(
+        &mut Probe(&mut world.borrow_mut()),
+        OptionBytes::FACTORY.with_bootloader(true).with_read_out(true),
+    )
+    .unwrap();
     // The protection of the flash takes effect at power-on.
     let now = world.borrow().now();
     world.borrow_mut().machine(0).power_off();

@@ -7,8 +7,8 @@ use canopen::lss::BitRate;
 use nodectl::lss::{Master, Selection};
 
 use crate::bench::Bench;
-use crate::{chip, values};
 use crate::desk::Action;
+use crate::{chip, values};
 
 /// All bit rates of the node, in kbit/s.
 const RATES: [u16; 8] = [1000, 800, 500, 250, 125, 50, 20, 10];

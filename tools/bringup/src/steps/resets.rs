@@ -7,8 +7,8 @@ use canopen::{Duration, Instant};
 use nodectl::nmt;
 
 use crate::bench::Bench;
-use crate::{chip, values};
 use crate::desk::Action;
+use crate::{chip, values};
 
 /// The longest time from a reset to the boot-up message.
 const START: Duration = Duration::from_millis(3000);

@@ -4,8 +4,8 @@ use anyhow::{Result, ensure};
 use canopen::Duration;
 
 use crate::bench::Bench;
-use crate::{chip, values};
 use crate::desk::Action;
+use crate::{chip, values};
 
 /// The channels of a scan, in their order in the buffer.
 pub(super) const PRESSURE: usize = 0;
@@ -110,7 +110,12 @@ fn noise_without_prefetch(bench: &mut Bench<'_>) -> Result<()> {
     bench.desk.write(chip::FLASH_ACR, settings & !PREFETCH)?;
     let quiet = channel(bench, PRESSURE)?.sigma;
     bench.desk.write(chip::FLASH_ACR, settings)?;
-    bench.remark("noise of pressure (PA0) without prefetch", format!("{quiet:.2} codes"), "no less than with it", "");
+    bench.remark(
+        "noise of pressure (PA0) without prefetch",
+        format!("{quiet:.2} codes"),
+        "no less than with it",
+        "",
+    );
     Ok(())
 }
 
@@ -208,7 +213,12 @@ fn rest(bench: &mut Bench<'_>) -> Result<()> {
         let again = raw_word(bench)?;
         raw = [raw[0] | again[0] ^ word[0], raw[1] | again[1] ^ word[1]];
     }
-    bench.remark("bits of the raw SSI word that toggle (2005h)", format!("{raw:08X?}"), "the lowest ones", "");
+    bench.remark(
+        "bits of the raw SSI word that toggle (2005h)",
+        format!("{raw:08X?}"),
+        "the lowest ones",
+        "",
+    );
     let state = bench.object(0x210B, 1)?;
     bench.check(
         "bits that toggle at rest",
