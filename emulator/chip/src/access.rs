@@ -147,7 +147,10 @@ impl Stm32f4 {
             Unit::Iwdg => self.iwdg.read(offset, now),
             Unit::Crc => self.crc.read(offset),
             Unit::BackupRam => self.backup_ram.read(offset),
-            Unit::Signature => signature::read(self.variant, self.board.unique_id, offset),
+            Unit::Signature => {
+                self.rules.check(!self.flash.is_busy(now), Breach::SystemMemory);
+                signature::read(self.variant, self.board.unique_id, offset)
+            }
             Unit::Absent => None,
         }
     }

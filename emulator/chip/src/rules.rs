@@ -114,6 +114,10 @@ pub enum Breach {
         /// The supply.
         millivolts: u32,
     },
+    /// System memory, which has the unique identifier and the calibration, is flash: a read during an operation of the flash
+    /// stops the core until its end, up to 2 s (RM0390 section 3.5).
+    #[error("system memory is read while the flash is busy")]
+    SystemMemory,
     /// A write to the backup domain while it is protected.
     #[error("{name} is written while the backup domain is protected")]
     Protected {

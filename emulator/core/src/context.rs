@@ -79,7 +79,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         };
         self.vector(taken, exc_return, entry);
         let core = self.cpu.get_data_mut();
-        core.stats.entered(taken, pended, core.now, pc);
+        core.count_entry(taken, pended, pc);
     }
 
     /// Starts the handler of an exception whose frame is on the stack.
@@ -197,7 +197,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.vector(exception, exc_return, TAIL_CHAIN);
         let core = self.cpu.get_data_mut();
         core.stats.tail_chained += 1;
-        core.stats.entered(exception, pended, core.now, exc_return);
+        core.count_entry(exception, pended, exc_return);
     }
 
     fn pop_frame(&mut self, exc_return: u32) {

@@ -18,7 +18,7 @@ use crate::nvic::{Masks, Nvic};
 use crate::profile::Profile;
 use crate::scb::Scb;
 use crate::seed::Bugs;
-use crate::stats::Stats;
+use crate::stats::{Entry, Stats};
 use crate::stepping::Stepping;
 use crate::systick::SysTick;
 use crate::watch::Watch;
@@ -316,7 +316,7 @@ impl<P: Peripherals> Core<P> {
 
     pub(crate) fn pend(&mut self, exception: Exception) {
         if !self.nvic.is_pending(exception) {
-            self.pended[usize::from(exception.0)] = self.now;
+            self.stamp(exception.bit());
         }
         self.nvic.pend(exception);
         self.calm = false;
@@ -325,9 +325,17 @@ impl<P: Peripherals> Core<P> {
     /// Records the instant at which these exceptions became pending.
     pub(crate) fn stamp(&mut self, mut fresh: u128) {
         while fresh != 0 {
-            self.pended[fresh.trailing_zeros() as usize] = self.now;
+            let exception = Exception(fresh.trailing_zeros() as u8);
+            self.pended[usize::from(exception.0)] = self.now;
+            self.stats.requested(exception, self.nvic.level(exception));
             fresh &= fresh - 1;
         }
+    }
+
+    /// Counts the entry of an exception that was requested at `requested`.
+    pub(crate) fn count_entry(&mut self, exception: Exception, requested: Time, pc: u32) {
+        let entry = Entry { requested, level: self.nvic.level(exception), cycle: self.cycle };
+        self.stats.entered(exception, entry, self.now, pc);
     }
 
     pub(crate) fn spend(&mut self, instructions: u32, cycles: u32) {

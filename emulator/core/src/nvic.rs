@@ -195,6 +195,11 @@ impl Nvic {
         i16::from(priority) & !((2 << self.group) - 1)
     }
 
+    /// The priority of an exception among the 16 of the chip; 0 for those with a fixed one.
+    pub(crate) fn level(&self, exception: Exception) -> usize {
+        (self.full_priority(exception).max(0) >> (8 - PRIORITY_BITS)) as usize
+    }
+
     pub(crate) fn group(&self) -> u32 {
         self.group
     }

@@ -17,8 +17,15 @@ pub struct Activity {
     pub worst_instructions: u64,
     /// Most cycles in one activation.
     pub worst_cycles: u64,
+    /// Most cycles in two activations in a row.
+    pub worst_pair: u64,
+    /// Cycles of the last activation.
+    last_cycles: u64,
     /// Longest time from the request to the first instruction.
     pub worst_latency: Time,
+    /// Longest part of it in which neither this exception nor one of the same or a higher priority ran: less urgent code that
+    /// masks it, and waits for the flash.
+    pub worst_blocking: Time,
     /// Longest time from the request to the end of the activation that serves it.
     pub worst_response: Time,
     /// Instant of the first entry.
@@ -64,8 +71,26 @@ pub struct Stats {
     /// A hash over every exception entry with its time and return address: equal runs have equal hashes.
     pub trace: u64,
     running: Running,
+    /// Cycles of handlers by their priority, 0 first; Thread mode is behind them.
+    by_level: [u64; LEVELS + 1],
+    /// The cycles of all handlers of the same or a higher priority, at the time of the last request of each exception.
+    at_request: [u64; Exception::COUNT],
     /// The activations that continue after `running`; Thread mode first.
     preempted: Vec<Running>,
+}
+
+/// The priorities of the chip.
+const LEVELS: usize = 16;
+
+/// The circumstances of an entry.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    /// The instant of the request.
+    pub(crate) requested: Time,
+    /// The priority, 0 for the highest.
+    pub(crate) level: usize,
+    /// The length of a cycle.
+    pub(crate) cycle: Time,
 }
 
 /// One activation that has not ended. It begins with its request, not with its entry: a request that comes while the
@@ -73,14 +98,15 @@ pub struct Stats {
 #[derive(Clone, Copy, Debug)]
 struct Running {
     exception: Exception,
+    level: usize,
     requested: Time,
     instructions: u64,
     cycles: u64,
 }
 
 impl Running {
-    fn new(exception: Exception, requested: Time) -> Running {
-        Running { exception, requested, instructions: 0, cycles: 0 }
+    fn new(exception: Exception, level: usize, requested: Time) -> Running {
+        Running { exception, level, requested, instructions: 0, cycles: 0 }
     }
 }
 
@@ -93,7 +119,9 @@ impl Default for Stats {
             exceptions: [Activity::default(); Exception::COUNT],
             tail_chained: 0,
             trace: 0xCBF2_9CE4_8422_2325,
-            running: Running::new(Exception::THREAD, Time::ZERO),
+            running: Running::new(Exception::THREAD, LEVELS, Time::ZERO),
+            by_level: [0; LEVELS + 1],
+            at_request: [0; Exception::COUNT],
             preempted: Vec::new(),
         }
     }
@@ -109,6 +137,8 @@ impl Stats {
         for activity in &mut self.exceptions {
             activity.worst_instructions = 0;
             activity.worst_cycles = 0;
+            activity.worst_pair = 0;
+            activity.worst_blocking = Time::ZERO;
             activity.worst_latency = Time::ZERO;
             activity.worst_response = Time::ZERO;
         }
@@ -120,12 +150,28 @@ impl Stats {
         self.cycles += u64::from(cycles);
         self.running.instructions += u64::from(instructions);
         self.running.cycles += u64::from(cycles);
+        self.by_level[self.running.level] += u64::from(cycles);
     }
 
-    pub(crate) fn entered(&mut self, exception: Exception, requested: Time, at: Time, pc: u32) {
+    /// Cycles of handlers of this priority and of higher ones.
+    fn urgent_cycles(&self, level: usize) -> u64 {
+        self.by_level[..=level.min(LEVELS - 1)].iter().sum()
+    }
+
+    /// An exception with this priority is requested.
+    pub(crate) fn requested(&mut self, exception: Exception, level: usize) {
+        self.at_request[usize::from(exception.0)] = self.urgent_cycles(level);
+    }
+
+    /// An exception begins. `entry` has its priority and the length of a cycle.
+    pub(crate) fn entered(&mut self, exception: Exception, entry: Entry, at: Time, pc: u32) {
+        let Entry { requested, level, cycle } = entry;
+        let urgent = self.urgent_cycles(level) - self.at_request[usize::from(exception.0)];
+        let blocking = Time(at.since(requested).0.saturating_sub(urgent * cycle.0));
         let activity = &mut self.exceptions[usize::from(exception.0)];
         activity.note_entry(at.since(requested), at);
-        let preempted = std::mem::replace(&mut self.running, Running::new(exception, requested));
+        activity.worst_blocking = activity.worst_blocking.max(blocking);
+        let preempted = std::mem::replace(&mut self.running, Running::new(exception, level, requested));
         self.preempted.push(preempted);
         for word in [u64::from(exception.0), at.0, u64::from(pc)] {
             // FNV-1a over words.
@@ -136,12 +182,14 @@ impl Stats {
     pub(crate) fn left(&mut self, at: Time) {
         let Some(preempted) = self.preempted.pop() else { return };
         let ended = std::mem::replace(&mut self.running, preempted);
-        let Running { exception, requested, instructions, cycles } = ended;
+        let Running { exception, requested, instructions, cycles, .. } = ended;
         let activity = &mut self.exceptions[usize::from(exception.0)];
         activity.instructions += instructions;
         activity.cycles += cycles;
         activity.worst_instructions = activity.worst_instructions.max(instructions);
         activity.worst_cycles = activity.worst_cycles.max(cycles);
+        activity.worst_pair = activity.worst_pair.max(activity.last_cycles + cycles);
+        activity.last_cycles = cycles;
         activity.worst_response = activity.worst_response.max(at.since(requested));
     }
 

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use bringup::{Action, Desk};
 use canbus::Time;
 use canopen::Duration;
+use chip::FrontEnd;
 use flash::{Content, Part};
 use nodectl::Network;
 use nodectl::update::Image;
@@ -85,6 +86,16 @@ impl EmulatedDesk {
         self.with(|world| {
             let now = world.now();
             world.machine(0).power_on(now);
+        });
+    }
+
+    /// PA0 is at VDDA itself: the transducer at its upper rail, with a supply that the divider brings to VDDA.
+    fn lift_input(&self, is_direct: bool) {
+        self.with(|world| {
+            let now = world.now();
+            let plant = world.machine(0).peripherals_mut().plant_mut(now);
+            let FrontEnd { supply, divider, .. } = *plant.front_end();
+            plant.rails.transducer = if is_direct { plant.rails.vdda / divider } else { supply };
         });
     }
 
@@ -167,9 +178,13 @@ impl Desk for EmulatedDesk {
             Action::Input { .. } => {
                 self.stimulate("fault", "rail-low:off")?;
                 self.stimulate("fault", "rail-high:on")?;
+                self.lift_input(true);
                 self.run(Duration::from_millis(100));
             }
-            Action::Transducer => self.stimulate("fault", "rail-high:off")?,
+            Action::Transducer => {
+                self.lift_input(false);
+                self.stimulate("fault", "rail-high:off")?;
+            }
             Action::Turn => self.turn()?,
         }
         Ok(true)

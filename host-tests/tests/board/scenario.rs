@@ -13,6 +13,8 @@ pub(crate) enum Node {
     Pressure,
     /// A pressure node that also saves its parameters.
     Saving,
+    /// A pressure node that saves its parameters while the supply is below what the flash needs.
+    LowSupply,
     /// A pressure node; interrupts come between any two instructions, and alignment faults are detected.
     Interleaved,
     /// A pressure node on a chip whose receive FIFOs release a mailbox slowly.
@@ -48,6 +50,7 @@ impl Node {
     pub(crate) fn flags(self) -> &'static str {
         match self {
             Node::Pressure | Node::Saving | Node::SlowFifo => "--bitrate 1000 --pressure const:400000",
+            Node::LowSupply => "--bitrate 1000 --pressure const:400000 --supply const:2.65",
             Node::Interleaved => "--bitrate 1000 --pressure const:400000 --interleave 1",
             Node::Encoder => "--bitrate 1000 --node 1:encoder --shaft rpm:100",
             Node::Absolute => "--bitrate 1000 --node 1:encoder --shaft const:0.25",
@@ -78,7 +81,7 @@ pub(crate) fn observe(
     keeps_time(&mut world, &master, &mut said);
     measures(&mut world, &master, node, &mut said);
     told(&world.summary(1.0, 0), &mut said);
-    if node == Node::Saving {
+    if matches!(node, Node::Saving | Node::LowSupply) {
         saves(&mut world, &master, &mut said);
     }
     said
@@ -140,7 +143,7 @@ fn flood(world: &mut World, master: &Master) {
 
 fn measures(world: &mut World, master: &Master, node: Node, said: &mut Vec<String>) {
     match node {
-        Node::Pressure | Node::Saving | Node::Interleaved | Node::SlowFifo => {
+        Node::Pressure | Node::Saving | Node::LowSupply | Node::Interleaved | Node::SlowFifo => {
             let value = world.summary(1.0, 0).nodes[0].heard.process_value;
             if value.is_none_or(|bar| (bar - 4.0).abs() > 0.02) {
                 said.push(format!("the pressure is {value:?} instead of 4.0 bar"));

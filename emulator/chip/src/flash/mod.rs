@@ -151,6 +151,11 @@ impl Flash {
         [2.7, 2.4, 2.1, 1.7][field(self.optcr, OPTCR_BOR, 2) as usize]
     }
 
+    /// Whether an operation is under way.
+    pub(crate) fn is_busy(&self, now: Time) -> bool {
+        now < self.busy_until
+    }
+
     /// Whether an operation is under way with a parallelism of 32 bits or more.
     pub(crate) fn works_by_words(&self, now: Time) -> bool {
         now < self.busy_until && field(self.cr, 8, 2) >= 2

@@ -151,6 +151,11 @@ impl Plant {
         self.thermistor.at(now)
     }
 
+    /// The circuits between sensors and chip.
+    pub fn front_end(&self) -> &FrontEnd {
+        &self.front_end
+    }
+
     /// The supply of the chip in volts.
     pub fn supply(&self, now: Time) -> f64 {
         self.supply.at(now)

@@ -217,6 +217,18 @@ fn a_breach_is_told_once() {
     assert_eq!(rig.chip.breach(), None);
 }
 
+#[test]
+fn system_memory_is_not_read_during_an_erase() {
+    const UNIQUE_ID: u32 = 0x1FFF_7A10;
+    let mut rig = Rig::new();
+    rig.unlock_flash();
+    rig.read(UNIQUE_ID);
+    rig.erase(4);
+    assert_eq!(rig.chip.breach(), None);
+    rig.read(UNIQUE_ID);
+    assert_eq!(rig.chip.breach(), Some(Breach::SystemMemory));
+}
+
 const DBGMCU_CR: u32 = 0xE004_2004;
 
 /// In RAM, at a multiple of eight, or without DBG_SLEEP a WFI is safe.

@@ -89,6 +89,7 @@ const FLASH_CR: u32 = 0x4002_3C10;
 const GPIOA: u32 = 0x4002_0000;
 const GPIOB: u32 = 0x4002_0400;
 const OSPEEDR: u32 = 0x08;
+const BSRR: u32 = 0x18;
 const AFRL: u32 = 0x20;
 const AFRH: u32 = 0x24;
 const CAN1: u32 = 0x4000_6400;
@@ -150,6 +151,13 @@ pub(super) const STORES: &[Row] = &[
         .with(Node::SlowFifo),
     wrong("no filter is active", CAN1 + 0x21C, u32::MAX, 0, "no answer to SDO"),
     wrong("time-triggered mode", CAN1, 1 << 7, 1 << 7, "CAN1"),
+    wrong(
+        "transceiver left asleep",
+        GPIOB + BSRR,
+        1 << 28 | 1 << 12,
+        1 << 12,
+        "CAN joins the bus with its transceiver asleep: PB12",
+    ),
     // ADC and DMA.
     wrong("temperature sampled for 3 cycles", ADC1 + 0x0C, 0b111 << 24, 0, "ADC channel 18 is sampled for"),
     wrong(
@@ -195,6 +203,8 @@ pub(super) const STORES: &[Row] = &[
     missing("flags of DMA1 are not cleared", DMA1 + 0x08, "stream 3 of DMA1 begins with flags")
         .with(Node::Absolute),
     // Flash.
+    wrong("voltage detector off", PWR_CR, 1 << 4, 0, "the flash is changed by words at 26")
+        .with(Node::LowSupply),
     missing("flash not unlocked", FLASH_KEYR, "a save is refused").with(Node::Saving),
     wrong("flash not in programming mode", FLASH_CR, 1 << 0, 0, "a save is refused").with(Node::Saving),
     wrong("flash programmed by bytes", FLASH_CR, 0b11 << 8, 0, "a save is refused").with(Node::Saving),

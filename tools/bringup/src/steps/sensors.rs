@@ -17,6 +17,8 @@ const CHANNELS: usize = 5;
 const PREFETCH: u32 = 1 << 8;
 /// Conversions in the buffer: two milliseconds of 16 scans, two conversions in a word.
 const WORDS: usize = 2 * 16 * CHANNELS / 2;
+/// The output of an intact transducer, as ratios of its supply: the defaults of 2200h:10 and 2200h:11.
+const INTACT: (f64, f64) = (0.025, 0.975);
 /// Noise of an input, standard deviation in codes.
 const NOISE: f64 = 4.0;
 /// Temperatures of the calibration in degC.
@@ -51,8 +53,9 @@ pub(super) fn channel(bench: &mut Bench<'_>, number: usize) -> Result<Channel> {
 }
 
 pub(super) fn analogue(bench: &mut Bench<'_>) -> Result<()> {
+    let supply = channel(bench, SUPPLY)?.mean;
     let inputs = [
-        (PRESSURE, "pressure (PA0)", (100.0, 4000.0)),
+        (PRESSURE, "pressure (PA0)", (INTACT.0 * supply, INTACT.1 * supply)),
         (SUPPLY, "supply of the transducer (PA1)", (2000.0, 4095.0)),
         (REFERENCE, "VREFINT", (1400.0, 1700.0)),
     ];
