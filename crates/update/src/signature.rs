@@ -36,10 +36,18 @@ impl Message {
         self.0.update(code);
     }
 
-    /// The hash of all added bytes; the message is empty again.
-    pub(crate) fn end(&mut self) -> [u8; HASH_LEN] {
-        self.0.finalize_reset().into()
+    /// The hash of all added bytes.
+    pub(crate) fn end(self) -> [u8; HASH_LEN] {
+        self.0.finalize().into()
     }
+}
+
+/// The hash of these parts, one after the other.
+#[inline(never)] // Many callers, and little room in flash.
+pub(crate) fn hash(parts: &[&[u8]]) -> [u8; HASH_LEN] {
+    let mut hash = Sha512::new();
+    parts.iter().for_each(|part| hash.update(part));
+    hash.finalize().into()
 }
 
 /// Bytes of a hash.
@@ -77,24 +85,14 @@ impl Verification {
     ) -> Option<Verification> {
         let (&r, rest) = signature.split_first_chunk()?;
         let s = *rest.first_chunk()?;
+        if !is_reduced(&s) {
+            return None;
+        }
         let minus_key = CompressedY(*key).decompressed().ok()?.neg();
         let length = u8::try_from(context.len()).ok()?;
-        let mut k = Sha512::new();
-        for part in [DOMAIN, &[length], context, &r, key, hash] {
-            k.update(part);
-        }
+        let k = self::hash(&[DOMAIN, &[length], context, &r, key, hash]);
         let sum = EdwardsPoint::neutral_element();
-        let new = Verification {
-            r,
-            s,
-            k: k.finalize().into(),
-            key: *key,
-            minus_key,
-            sum,
-            rest: HASH_LEN,
-            found: [0; LEN],
-        };
-        is_reduced(&s).then_some(new)
+        Some(Verification { r, s, k, key: *key, minus_key, sum, rest: HASH_LEN, found: [0; LEN] })
     }
 
     /// Does one step of 65: a byte of the numbers, or finally the comparison. Returns whether the signature is valid

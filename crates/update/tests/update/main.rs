@@ -4,6 +4,7 @@ mod bench;
 mod commit_cuts;
 mod corrupted;
 mod header;
+mod key_ranks;
 mod ordinary;
 mod power_cuts;
 mod sequences;
