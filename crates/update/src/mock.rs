@@ -1,6 +1,8 @@
 //! A flash for tests: sectors of different sizes, words of four or eight bytes, and an erase that takes several polls.
 
+use core::cell::RefCell;
 use core::ops::{Deref, DerefMut, Range};
+use std::collections::HashMap;
 use std::vec::Vec;
 
 use cells::{Cells, WORD};
@@ -12,6 +14,30 @@ pub use cells::{PowerCut, Weak};
 
 /// Number of polls that an erase takes.
 const ERASE_POLLS: u32 = 3;
+
+/// Number of points that are kept.
+const MOST_POINTS: usize = 10_000;
+
+std::thread_local! {
+    /// The points of signatures that were computed, because tests verify the same images again and again, and the
+    /// arithmetic would take all of their time. A point is kept for all of its numbers, so no result is another one.
+    static POINTS: RefCell<HashMap<Vec<u8>, [u8; 32]>> = RefCell::new(HashMap::new());
+}
+
+/// The point of these numbers, if it was computed before.
+pub(crate) fn known_point(numbers: &[u8]) -> Option<[u8; 32]> {
+    POINTS.with_borrow(|points| points.get(numbers).copied())
+}
+
+/// Keeps the point of these numbers.
+pub(crate) fn learn_point(numbers: Vec<u8>, point: [u8; 32]) {
+    POINTS.with_borrow_mut(|points| {
+        if points.len() >= MOST_POINTS {
+            points.clear();
+        }
+        points.insert(numbers, point);
+    });
+}
 
 /// A flash whose [`Cells`] define the power cuts.
 #[derive(Clone, Debug)]

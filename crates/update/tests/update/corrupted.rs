@@ -99,8 +99,8 @@ fn headers() -> Vec<Kind> {
         ("a counter that cannot be kept", signed(|about| about.counter = 33), Refusal::HeaderContent),
         (
             "a counter that rises too far",
-            signed(|about| about.counter = 22),
-            Refusal::CounterStep { most: 21 },
+            signed(|about| about.counter = 17),
+            Refusal::CounterStep { most: 16 },
         ),
         ("no code by the header", header(put(24, 0)), Refusal::HeaderContent),
         ("no whole number of words", header(put(24, 618)), Refusal::HeaderContent),
