@@ -45,6 +45,8 @@ pub struct MockFlash {
     cells: Cells,
     word: usize,
     sectors: Vec<Range<usize>>,
+    /// The start of the sector of each erase.
+    erased: Vec<usize>,
     busy: u32,
 }
 
@@ -65,13 +67,20 @@ impl MockFlash {
         });
         let sectors_of = ranges.collect();
         let cells = Cells::with_words(sectors.iter().sum(), word, seed);
-        MockFlash { sectors: sectors_of, cells, word, busy: 0 }
+        MockFlash { sectors: sectors_of, erased: Vec::new(), cells, word, busy: 0 }
     }
 
     /// Switches the power on, without a further cut.
     pub fn power_up(&mut self) {
         self.busy = 0;
         self.cells.power_up();
+    }
+
+    /// Number of erases of the sector that begins at `offset`.
+    #[must_use]
+    pub fn erases(&self, offset: usize) -> u32 {
+        let erases = self.erased.iter().filter(|start| **start == offset).count();
+        u32::try_from(erases).unwrap_or(u32::MAX)
     }
 
     /// Checks that no erase is in progress, because the flash can then neither be read nor programmed.
@@ -132,6 +141,7 @@ impl Flash for MockFlash {
         let sector = self.sectors.iter().find(|sector| sector.start == offset as usize);
         let sector = sector.expect("the start of a sector").clone();
         self.busy = ERASE_POLLS;
+        self.erased.push(sector.start);
         self.cells.erase(sector)
     }
 

@@ -60,8 +60,8 @@ const DOMAIN: &[u8] = b"SigEd25519 no Ed25519 collisions\x01";
 /// The verification of a signature, which consists of a point R and a number S: whether \[S\]B = R + \[k\]A, where B is
 /// the base point, A the key, and k a hash of everything. \[S\]B - \[k\]A is computed and compared with R.
 pub(crate) struct Verification {
-    r: [u8; LEN],
-    s: [u8; LEN],
+    /// R, then S.
+    signature: [u8; SIGNATURE_LEN],
     k: [u8; HASH_LEN],
     key: [u8; KEY_LEN],
     /// -A.
@@ -83,16 +83,23 @@ impl Verification {
         signature: &[u8; SIGNATURE_LEN],
         key: &[u8; KEY_LEN],
     ) -> Option<Verification> {
-        let (&r, rest) = signature.split_first_chunk()?;
-        let s = *rest.first_chunk()?;
-        if !is_reduced(&s) {
+        let (r, s) = halves(signature);
+        if !is_reduced(s) {
             return None;
         }
         let minus_key = CompressedY(*key).decompressed().ok()?.neg();
         let length = u8::try_from(context.len()).ok()?;
-        let k = self::hash(&[DOMAIN, &[length], context, &r, key, hash]);
+        let k = self::hash(&[DOMAIN, &[length], context, r, key, hash]);
         let sum = EdwardsPoint::neutral_element();
-        Some(Verification { r, s, k, key: *key, minus_key, sum, rest: HASH_LEN, found: [0; LEN] })
+        Some(Verification {
+            signature: *signature,
+            k,
+            key: *key,
+            minus_key,
+            sum,
+            rest: HASH_LEN,
+            found: [0; LEN],
+        })
     }
 
     /// Does one step of 65: a byte of the numbers, or finally the comparison. Returns whether the signature is valid
@@ -101,7 +108,7 @@ impl Verification {
         #[cfg(feature = "mock")]
         if let Some(found) = crate::mock::known_point(&self.equation()) {
             self.found = found;
-            return Some(self.found == self.r);
+            return Some(found == *halves(&self.signature).0);
         }
         if let Some(at) = self.rest.checked_sub(1) {
             self.rest = at;
@@ -111,19 +118,19 @@ impl Verification {
             self.found = self.sum.compressed().0;
             #[cfg(feature = "mock")]
             crate::mock::learn_point(self.equation(), self.found);
-            Some(self.found == self.r)
+            Some(self.found == *halves(&self.signature).0)
         }
     }
 
     /// The numbers of \[S\]B - \[k\]A.
     #[cfg(feature = "mock")]
     fn equation(&self) -> std::vec::Vec<u8> {
-        [&self.s[..], &self.k, &self.key].concat()
+        [&halves(&self.signature).1[..], &self.k, &self.key].concat()
     }
 
     /// The result as a word, after the last step: see [`seal`].
     pub(crate) fn seal(&self, crc: u32) -> u32 {
-        seal(crc, &self.found, &self.r)
+        seal(crc, &self.found, halves(&self.signature).0)
     }
 
     /// The key used for the verification.
@@ -133,7 +140,8 @@ impl Verification {
 
     /// Doubles and adds for one byte of the numbers. S has no bits beyond its 32 bytes.
     fn add_byte(&mut self, at: usize) {
-        let [k, s] = [self.k.get(at), self.s.get(at)].map(|byte| byte.copied().unwrap_or(0));
+        let [k, s] =
+            [self.k.get(at), halves(&self.signature).1.get(at)].map(|byte| byte.copied().unwrap_or(0));
         let base = EdwardsPoint::basepoint();
         for bit in (0..8).rev() {
             self.sum = self.sum.add(&self.sum);
@@ -143,6 +151,15 @@ impl Verification {
                 }
             }
         }
+    }
+}
+
+/// R and S of a signature.
+fn halves(signature: &[u8; SIGNATURE_LEN]) -> (&[u8; LEN], &[u8; LEN]) {
+    let (halves, _) = signature.as_chunks();
+    match halves {
+        [r, s] => (r, s),
+        _ => (&[0; LEN], &[0; LEN]),
     }
 }
 

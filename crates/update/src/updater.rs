@@ -391,9 +391,8 @@ impl<F: Flash> Updater<F> {
 
     /// Installs the staged image, which was found valid before the application was kept.
     fn install_staged(&mut self) -> Result<(), Refusal> {
-        let mut header = Header::EMPTY;
-        image::candidate(&mut self.flash, &self.target, &mut header)?;
-        self.replace(Plan::Install, &header);
+        let check = FullCheck::new(&mut self.flash, &self.target)?;
+        self.replace(Plan::Install, check.header());
         Ok(())
     }
 

@@ -9,3 +9,4 @@ mod ordinary;
 mod power_cuts;
 mod sequences;
 mod trial;
+mod wear;
