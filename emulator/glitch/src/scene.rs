@@ -7,6 +7,7 @@ use bsp::sectors;
 use bsp::update_layout::LAYOUT;
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
+use update::key::{Certificate, KeyList};
 use update::mock::MockFlash;
 use update::{
     Decision, Description, Flash, HEADER_LEN, Next, Phase, Start, Status, Target, Trial, Updater, Version,
@@ -58,6 +59,12 @@ impl Scene {
                 "neutral",
                 "an application whose signature fits an equation that is left out",
                 bare(&neutral()?.to_bytes()),
+                Begin::Power,
+            ),
+            alone(
+                "certified",
+                "an application whose release key nobody has certified",
+                bare(&certified()?.to_bytes()),
                 Begin::Power,
             ),
             alone("bare", "an application without a header", bare(&headless), Begin::Power),
@@ -126,6 +133,16 @@ fn neutral() -> Result<Image> {
     let mut signature = [0; 64];
     signature[0] = 1;
     with_signature(signature)
+}
+
+/// The signature is good, of a release key that the list names without a signature of the root key.
+fn certified() -> Result<Image> {
+    let thief = SigningKey::from_bytes(&[0x66; 32]);
+    let key = thief.verifying_key().to_bytes();
+    let certificate = Certificate { generation: 1, counter: 0, key, signature: [0; 64] };
+    let image = signed(BAD, NEWER)?;
+    let keys = KeyList { release: Some(certificate), root: None };
+    Image::sign(Description { keys, ..image.header.description() }, image.code, &thief)
 }
 
 fn with_signature(signature: [u8; 64]) -> Result<Image> {
