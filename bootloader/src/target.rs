@@ -12,6 +12,6 @@ pub(crate) const TARGET: Target =
 
 const _: () = assert!(
     cfg!(any(feature = "development", feature = "published-keys")) || !HAS_PUBLISHED_KEY,
-    "the bootloader needs a key of its owner in UPDATE_PUBLIC_KEY that is not published, or the feature `development` \
+    "the bootloader needs a key of its owner in UPDATE_RELEASE_KEY and one in UPDATE_ROOT_KEY, that are not published, or the feature `development` \
      (docs/update.md)"
 );

@@ -154,6 +154,7 @@ def test_the_documented_commands_lead_from_a_key_to_an_accepted_update(tmp_path:
     home = tmp_path / "home"
     (home / "secret").mkdir(parents=True)
     (home / "safe").mkdir()
+    (home / "vault").mkdir()
 
     def sign(command: str) -> str:
         images = str(Path(os.environ["NODE_IMAGES"]) / "firmware")
@@ -162,11 +163,17 @@ def test_the_documented_commands_lead_from_a_key_to_an_accepted_update(tmp_path:
         return subprocess.run(arguments, check=True, stdout=subprocess.PIPE, text=True, cwd=tmp_path).stdout
 
     for command in documented("key"):
-        assert re.fullmatch(r"UPDATE_PUBLIC_KEY=[0-9a-f]{64}\n", sign(command))
-    for name, secret in [("secret/first.pem", 0x42), ("safe/second.pem", 0x43)]:
+        assert re.fullmatch(r"UPDATE_(RELEASE|ROOT|RECOVERY)_KEY=[0-9a-f]{64}\n", sign(command))
+    for name, secret in [("secret/release.pem", 0x42), ("safe/root.pem", 0x43), ("vault/recovery.pem", 0x44)]:
         (home / name).write_text(pem(bytes([secret] * 32)))
-    image_of_first, _ = documented("image")
-    sign(image_of_first)
+    digits = {word: sign(f"public ~/{file}.pem").split("=")[1].strip() for word, file in
+              [("RELEASE_1", "secret/release-1"), ("ROOT_1", "safe/root-1"), ("RELEASE_2", "secret/release-2")]}
+    for command in documented("key-list"):
+        for word, text in digits.items():
+            command = command.replace(word, text)
+        assert "generation" in sign(command)
+    for command in documented("image"):
+        sign(command)
     for command in documented("show"):
         assert "signature   good" in sign(command)
 

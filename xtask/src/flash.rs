@@ -28,9 +28,12 @@ pub(crate) struct Flags {
     /// Write the bootloader of an owner, which trusts this secret key, and sign with it
     #[arg(long)]
     key: Option<PathBuf>,
-    /// The second key that the bootloader of an owner trusts: the 64 digits of its public half
-    #[arg(long, requires = "key", value_name = "DIGITS")]
-    second_key: Option<String>,
+    /// The root key of the bootloader of an owner: the 64 digits of its public half
+    #[arg(long, requires = "key", value_name = "DIGITS", required_unless_present = "development")]
+    root_key: Option<String>,
+    /// The recovery key of the bootloader of an owner: the 64 digits of its public half
+    #[arg(long, requires = "root_key", value_name = "DIGITS")]
+    recovery_key: Option<String>,
     /// Print what would be written, and the calls of probe-rs, and make none
     #[arg(long)]
     dry_run: bool,
@@ -66,8 +69,8 @@ impl Flags {
         if let Some(key) = &self.key {
             tool.arg("--key").arg(key);
         }
-        if let Some(key) = &self.second_key {
-            tool.arg("--second-key").arg(key);
+        for (flag, key) in [("--root-key", &self.root_key), ("--recovery-key", &self.recovery_key)] {
+            tool.args(key.iter().flat_map(|key| [flag, key]));
         }
         tool.args(self.board.flags());
         tool
@@ -93,7 +96,7 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     if let Some(key) = &flags.key {
         keys.push(variable(key)?);
     }
-    keys.extend(flags.second_key.clone());
+    keys.extend(flags.root_key.iter().chain(&flags.recovery_key).cloned());
     let bootloader = images::compile_bootloader(&toolchain, &keys)?;
     become_program(&mut flags.tool(&bootloader, &application))
 }

@@ -92,8 +92,8 @@ pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
 /// Compiles the firmware and the bootloader with the keys in the environment. The owner of the keys signs the firmware.
 pub(crate) fn build_for_owner() -> Result<()> {
     ensure!(
-        std::env::var_os("UPDATE_PUBLIC_KEY").is_some(),
-        "the bootloader needs the key of its owner in UPDATE_PUBLIC_KEY; `cargo xtask sign key FILE` makes one. \
+        KEYS[..2].iter().all(|key| std::env::var_os(key).is_some()),
+        "the bootloader needs the keys of its owner in UPDATE_RELEASE_KEY and UPDATE_ROOT_KEY; `cargo xtask sign key FILE` makes one. \
          For a board on a desk: cargo xtask images --development"
     );
     // Apart, as in the tests: together, cargo gives the bootloader the features that the firmware needs.
@@ -147,10 +147,13 @@ pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
     let (published, secret) = (digits.lines().next(), of_tests("authorisation-key.hex")?);
     // Any key that is not published.
     let own = "42".repeat(32);
+    let published = published.unwrap_or_default();
     refuses(toolchain, &[])?;
-    refuses(toolchain, &[(KEYS[0], published.unwrap_or_default())])?;
-    refuses(toolchain, &[(KEYS[0], &own), (KEYS[1], published.unwrap_or_default())])?;
-    refuses(toolchain, &[(KEYS[0], &own), (AUTHORISATION_KEY, secret.trim())])
+    refuses(toolchain, &[(KEYS[0], &own)])?;
+    refuses(toolchain, &[(KEYS[0], published), (KEYS[1], &own)])?;
+    refuses(toolchain, &[(KEYS[0], &own), (KEYS[1], published)])?;
+    refuses(toolchain, &[(KEYS[0], &own), (KEYS[1], &own), (KEYS[2], published)])?;
+    refuses(toolchain, &[(KEYS[0], &own), (KEYS[1], &own), (AUTHORISATION_KEY, secret.trim())])
 }
 
 /// Checks that the bootloader of an owner does not compile with these variables.
@@ -169,7 +172,7 @@ fn refuses(toolchain: &Toolchain, variables: &[(&str, &str)]) -> Result<()> {
 }
 
 /// The environment variables with the public keys.
-const KEYS: [&str; 2] = ["UPDATE_PUBLIC_KEY", "UPDATE_PUBLIC_KEY_2"];
+const KEYS: [&str; 3] = ["UPDATE_RELEASE_KEY", "UPDATE_ROOT_KEY", "UPDATE_RECOVERY_KEY"];
 /// The environment variable with the key that authorises an update.
 const AUTHORISATION_KEY: &str = "UPDATE_AUTHORISATION_KEY";
 

@@ -47,7 +47,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Build the firmware and the bootloader for the Cortex-M4 (with the keys in UPDATE_PUBLIC_KEY and UPDATE_PUBLIC_KEY_2)
+    /// Build the firmware and the bootloader for the Cortex-M4 (with the keys in UPDATE_RELEASE_KEY, UPDATE_ROOT_KEY and UPDATE_RECOVERY_KEY)
     Images {
         /// For a board on a desk: the bootloader starts unsigned images and trusts the development key, which everybody
         /// knows; the firmware is signed with this key. Also builds the images for the tests

@@ -175,8 +175,8 @@ impl NodeApplication {
     }
 
     pub(crate) fn show_programs(&self, image: &mut [u8]) {
-        let Programs { counter, revoked_keys, staged, kept } = self.programs;
-        self.show(PROGRAM_STATE, 3, &[revoked_keys], image);
+        let Programs { counter, generation, staged, kept } = self.programs;
+        self.show(PROGRAM_STATE, 3, &[(generation & 0xFF) as u8], image);
         for (sub, word) in [(2, counter), (4, staged), (5, kept)] {
             self.show(PROGRAM_STATE, sub, &word.to_le_bytes(), image);
         }

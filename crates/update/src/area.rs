@@ -76,7 +76,7 @@ impl Layout {
         if fits { Some(layout) } else { None }
     }
 
-    /// The area of the security counter and the revoked keys: an update programs it, and nothing ever erases it.
+    /// The area of the security counter and the generation of keys: an update programs it, and nothing ever erases it.
     #[must_use]
     pub const fn security(&self) -> Area {
         self.security
@@ -135,8 +135,8 @@ mod tests {
 
     #[test]
     fn the_longest_image_fits_where_it_runs_and_where_it_is_staged() {
-        let (security, application) = (Area::new(0, &[256]), Area::new(256, &[1024, 2048]));
-        let (short, long) = (Area::new(3328, &[2048, 1024]), Area::new(3328, &[2048, 2048]));
+        let (security, application) = (Area::new(0, &[2048]), Area::new(2048, &[1024, 2048]));
+        let (short, long) = (Area::new(5120, &[2048, 1024]), Area::new(5120, &[2048, 2048]));
         let longest =
             |staging, kept| Layout::new(security, application, staging, kept).unwrap().longest_image();
         assert_eq!(longest(long, long), 3072);
@@ -146,11 +146,11 @@ mod tests {
 
     #[test]
     fn areas_that_are_too_small_are_refused() {
-        let (security, image) = (Area::new(0, &[256]), Area::new(256, &[2048]));
+        let (security, image) = (Area::new(0, &[2048]), Area::new(2048, &[2048]));
         assert!(Layout::new(security, image, image, image).is_some());
-        assert!(Layout::new(Area::new(0, &[128]), image, image, image).is_none());
-        assert!(Layout::new(security, Area::new(256, &[512]), image, image).is_none());
-        assert!(Layout::new(security, image, Area::new(256, &[1024]), image).is_none());
-        assert!(Layout::new(security, image, image, Area::new(256, &[1024])).is_none());
+        assert!(Layout::new(Area::new(0, &[1024]), image, image, image).is_none());
+        assert!(Layout::new(security, Area::new(2048, &[512]), image, image).is_none());
+        assert!(Layout::new(security, image, Area::new(2048, &[1024]), image).is_none());
+        assert!(Layout::new(security, image, image, Area::new(2048, &[1024])).is_none());
     }
 }

@@ -79,7 +79,7 @@ impl Stay {
 ///
 /// Writes to the flash in these cases. A record that was cut and may read differently next time is revoked, so that the
 /// decision of this start is final. Unrequested starts of an application on trial are counted. For a signed application
-/// that is not on trial, its security counter and the keys that it revokes are recorded.
+/// that is not on trial, its security counter and the generation of its keys are recorded.
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
@@ -146,12 +146,12 @@ fn trial<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Trial {
     Trial::read(flash, &target.layout)
 }
 
-/// Records counter and revoked keys of the application whose signature was verified since power-on: it has run, and may
+/// Records counter and key generation of the application whose signature was verified since power-on: it has run, and may
 /// be about to be replaced.
 fn note_proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) {
-    if let Ok(header) = image::header(flash, target.layout.application())
-        && proof == Proof::Of(header.crc())
-    {
+    let mut header = Header::EMPTY;
+    let is_whole = header.read(flash, target.layout.application()).is_ok();
+    if is_whole && proof == Proof::Of(header.crc()) {
         note(flash, target, &header);
     }
 }
@@ -173,13 +173,14 @@ pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Re
 
 fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32) -> Result<Header, Refusal> {
     let area = target.layout.application();
-    let header = image::admitted(flash, target, area)?;
+    let mut header = Header::EMPTY;
+    image::admitted(flash, target, area, &mut header)?;
     let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
     let mut check = FullCheck::of(&header, area, !is_proven);
     while !check.step(flash, target)? {}
     *seal = if let Proof::Of(word) = proof { word } else { 0 };
     if !is_proven {
-        *seal = check.seal(target);
+        *seal = check.seal();
     }
-    Ok(*check.header())
+    Ok(header)
 }

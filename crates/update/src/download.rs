@@ -1,7 +1,7 @@
 //! The download: bytes in order, any number at a time, programmed in chunks.
 
 use crate::flash::{CHUNK, Flash, first, program};
-use crate::header::HEADER;
+use crate::header::{HEADER, Header};
 use crate::image;
 use crate::refusal::Refusal;
 use crate::target::{Target, image_len};
@@ -73,7 +73,9 @@ impl Download {
     /// Checks the header as soon as it is complete, so that a wrong header is refused at once and not after minutes.
     fn look_at_header<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<(), Refusal> {
         if self.expected.is_none() && self.programmed >= HEADER {
-            self.expected = Some(image_len(&image::candidate(flash, target)?));
+            let mut header = Header::EMPTY;
+            image::candidate(flash, target, &mut header)?;
+            self.expected = Some(image_len(&header));
         }
         Ok(())
     }

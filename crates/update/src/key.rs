@@ -1,7 +1,11 @@
-//! The public keys that images are signed with, as given to the build of the bootloader.
+//! The public keys of the bootloader, as given to its build.
 //!
 //! `cargo xtask sign key` makes a key pair and prints the variable for the build of the bootloader; docs/update.md
-//! describes how to keep the secret half, and the purpose of the second key.
+//! describes the ranks, and how to keep the secret halves.
+
+pub use crate::certificate::{
+    CERTIFICATE_LEN, Certificate, GENERATIONS, KEYS_CONTEXT, KeyList, RELEASES, root_generation,
+};
 
 /// Bytes of an Ed25519 public key.
 pub const KEY_LEN: usize = 32;
@@ -14,29 +18,45 @@ pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [
     0x53, 0x25, 0xCA, 0x80, 0xD8, 0x06, 0x8B, 0xDA, 0x9B, 0x5F, 0x44, 0xA3, 0x9F, 0xE4, 0x66,
 ];
 
-/// Number of keys that a bootloader trusts.
-pub const KEYS: usize = 2;
+/// The ranks of the keys, the lowest first. A key signs for the rank below it, and so replaces the key there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rank {
+    /// Signs images.
+    Release,
+    /// Signs the certificate of a release key. It belongs to a place without a network.
+    Root,
+    /// Signs the certificate of a root key, when that is lost or known. It belongs to another place.
+    Recovery,
+}
 
-/// The keys that this bootloader trusts, by their number: 64 hexadecimal digits each, in the variables
-/// `UPDATE_PUBLIC_KEY` and `UPDATE_PUBLIC_KEY_2` when the bootloader is built. Without the second variable, key 1 is
-/// the same as key 0; without the first, key 0 is the development key.
-pub static PUBLIC_KEYS: [[u8; KEY_LEN]; KEYS] = [FIRST, SECOND];
+/// Number of ranks.
+pub const RANKS: usize = 3;
 
-const FIRST: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY") {
+/// The keys of this bootloader by their rank: 64 hexadecimal digits each, in the variables `UPDATE_RELEASE_KEY`,
+/// `UPDATE_ROOT_KEY` and `UPDATE_RECOVERY_KEY` when the bootloader is built. Without the third variable, the recovery key
+/// is the root key. A missing release or root key is the development key.
+pub static PUBLIC_KEYS: [[u8; KEY_LEN]; RANKS] = [RELEASE, ROOT, RECOVERY];
+
+const RELEASE: [u8; KEY_LEN] = match option_env!("UPDATE_RELEASE_KEY") {
     Some(digits) => key(digits.as_bytes()),
     None => DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
 };
-const SECOND: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY_2") {
+const ROOT: [u8; KEY_LEN] = match option_env!("UPDATE_ROOT_KEY") {
     Some(digits) => key(digits.as_bytes()),
-    None => FIRST,
+    None => DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
+};
+const RECOVERY: [u8; KEY_LEN] = match option_env!("UPDATE_RECOVERY_KEY") {
+    Some(digits) => key(digits.as_bytes()),
+    None => ROOT,
 };
 
 /// Public keys whose secret half is published: in this repository (the development key, and the keys of the tests) or in
 /// RFC 8032, 7.1 and 7.3; and two points of small order, for which anybody can make signatures.
-const PUBLISHED: [[u8; KEY_LEN]; 10] = [
+const PUBLISHED: [[u8; KEY_LEN]; 11] = [
     DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
     key(b"2152f8d19b791d24453242e15f2eab6cb7cffa7b6a5ed30097960e069881db12"),
     key(b"22fc297792f0b6ffc0bfcfdb7edb0c0aa14e025a365ec0e342e86e3829cb74b6"),
+    key(b"d759793bbc13a2819a827c76adb6fba8a49aee007f49f2d0992d99b825ad2c48"),
     key(b"d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a"),
     key(b"3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c"),
     key(b"fc51cd8e6218a1a38da47ed00230f0580816ed13ba3303ac5deb911548908025"),
@@ -56,8 +76,9 @@ pub const fn is_published(key: &[u8; KEY_LEN]) -> bool {
 }
 
 /// Whether a key of this build is published: one of [`PUBLIC_KEYS`], or the authorisation key.
-pub const HAS_PUBLISHED_KEY: bool = is_published(&FIRST)
-    || is_published(&SECOND)
+pub const HAS_PUBLISHED_KEY: bool = is_published(&RELEASE)
+    || is_published(&ROOT)
+    || is_published(&RECOVERY)
     || match &crate::AUTHORISATION_KEY {
         Some(secret) => is_among(secret, &PUBLISHED_SECRETS),
         None => false,

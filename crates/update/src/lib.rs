@@ -54,6 +54,7 @@ extern crate std;
 mod area;
 mod authorisation;
 mod boot;
+mod certificate;
 mod copy;
 mod crashes;
 mod download;
@@ -62,8 +63,6 @@ mod flash;
 mod header;
 mod image;
 pub mod key;
-#[cfg(feature = "mock")]
-mod known;
 #[cfg(feature = "mock")]
 pub mod mock;
 mod programs;
@@ -83,6 +82,7 @@ pub use boot::{Decision, Proof, Start, Stay, application, boot, boot_sealed};
 pub use crashes::{Crashes, Reset};
 pub use flash::Flash;
 pub use header::{Description, HEADER_LEN, Header, SIGNATURE_LEN, SIGNED_LEN, Version};
+pub use image::COUNTER_STEP;
 pub use programs::Programs;
 pub use refusal::Refusal;
 pub use signature::CONTEXT;

@@ -1,6 +1,8 @@
 //! A flash for tests: sectors of different sizes, words of four or eight bytes, and an erase that takes several polls.
 
+use core::cell::RefCell;
 use core::ops::{Deref, DerefMut, Range};
+use std::collections::HashMap;
 use std::vec::Vec;
 
 use cells::{Cells, WORD};
@@ -13,12 +15,38 @@ pub use cells::{PowerCut, Weak};
 /// Number of polls that an erase takes.
 const ERASE_POLLS: u32 = 3;
 
+/// Number of points that are kept.
+const MOST_POINTS: usize = 10_000;
+
+std::thread_local! {
+    /// The points of signatures that were computed, because tests verify the same images again and again, and the
+    /// arithmetic would take all of their time. A point is kept for all of its numbers, so no result is another one.
+    static POINTS: RefCell<HashMap<Vec<u8>, [u8; 32]>> = RefCell::new(HashMap::new());
+}
+
+/// The point of these numbers, if it was computed before.
+pub(crate) fn known_point(numbers: &[u8]) -> Option<[u8; 32]> {
+    POINTS.with_borrow(|points| points.get(numbers).copied())
+}
+
+/// Keeps the point of these numbers.
+pub(crate) fn learn_point(numbers: Vec<u8>, point: [u8; 32]) {
+    POINTS.with_borrow_mut(|points| {
+        if points.len() >= MOST_POINTS {
+            points.clear();
+        }
+        points.insert(numbers, point);
+    });
+}
+
 /// A flash whose [`Cells`] define the power cuts.
 #[derive(Clone, Debug)]
 pub struct MockFlash {
     cells: Cells,
     word: usize,
     sectors: Vec<Range<usize>>,
+    /// The start of the sector of each erase.
+    erased: Vec<usize>,
     busy: u32,
 }
 
@@ -39,13 +67,20 @@ impl MockFlash {
         });
         let sectors_of = ranges.collect();
         let cells = Cells::with_words(sectors.iter().sum(), word, seed);
-        MockFlash { sectors: sectors_of, cells, word, busy: 0 }
+        MockFlash { sectors: sectors_of, erased: Vec::new(), cells, word, busy: 0 }
     }
 
     /// Switches the power on, without a further cut.
     pub fn power_up(&mut self) {
         self.busy = 0;
         self.cells.power_up();
+    }
+
+    /// Number of erases of the sector that begins at `offset`.
+    #[must_use]
+    pub fn erases(&self, offset: usize) -> u32 {
+        let erases = self.erased.iter().filter(|start| **start == offset).count();
+        u32::try_from(erases).unwrap_or(u32::MAX)
     }
 
     /// Checks that no erase is in progress, because the flash can then neither be read nor programmed.
@@ -106,6 +141,7 @@ impl Flash for MockFlash {
         let sector = self.sectors.iter().find(|sector| sector.start == offset as usize);
         let sector = sector.expect("the start of a sector").clone();
         self.busy = ERASE_POLLS;
+        self.erased.push(sector.start);
         self.cells.erase(sector)
     }
 

@@ -2,7 +2,7 @@
 
 use crate::area::{Area, Layout};
 use crate::flash::Flash;
-use crate::image;
+use crate::header::Header;
 use crate::security::Security;
 
 /// The programs of a node. A number is 0 where the flash does not tell it.
@@ -10,8 +10,8 @@ use crate::security::Security;
 pub struct Programs {
     /// The lowest security counter that an image may have.
     pub counter: u32,
-    /// The revoked keys, bit n for key n.
-    pub revoked_keys: u8,
+    /// The lowest generation of keys that an image may have.
+    pub generation: u32,
     /// Identification of the newest downloaded program: the program on trial, or the one that was taken back.
     pub staged: u32,
     /// Identification of the program that was kept before the last update.
@@ -23,8 +23,8 @@ impl Programs {
     pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Programs {
         let security = Security(layout.security());
         Programs {
-            counter: security.least_counter(flash).unwrap_or(0),
-            revoked_keys: security.revoked(flash),
+            counter: security.least_counter(flash),
+            generation: security.least_generation(flash),
             staged: identification(flash, layout.staging()),
             kept: identification(flash, layout.kept()),
         }
@@ -34,5 +34,6 @@ impl Programs {
 /// The identification of the image in an area.
 #[inline(never)]
 fn identification<F: Flash>(flash: &mut F, area: Area) -> u32 {
-    image::header(flash, area).map_or(0, |header| header.code_crc())
+    let mut header = Header::EMPTY;
+    header.read(flash, area).map_or(0, |()| header.code_crc())
 }

@@ -104,11 +104,14 @@ pub(crate) fn mark<F: Flash>(flash: &mut F, at: u32) -> Result<(), Refusal> {
     program(flash, at, first(&mut [0; 8], word))
 }
 
-/// Whether the word at `at` is zero.
-pub(crate) fn is_zero<F: Flash>(flash: &mut F, at: u32) -> Result<bool, Refusal> {
-    let mut word = [0xFF; 4];
-    flash.read(at, &mut word).map_err(|_| Refusal::Unspecified)?;
-    Ok(word == [0; 4])
+/// Whether the word at `at` is zero. A word that cannot be read has these bytes.
+#[inline(never)] // Many callers, and little room in flash.
+pub(crate) fn is_zero<F: Flash>(flash: &mut F, at: u32, unread: u8) -> bool {
+    let mut word = [0; 4];
+    if flash.read(at, &mut word).is_err() {
+        word = [unread; 4];
+    }
+    word == [0; 4]
 }
 
 #[cfg(test)]

@@ -40,10 +40,15 @@ pub enum Refusal {
         /// The lowest accepted counter.
         least: u32,
     },
-    /// The signing key of the image has been revoked.
+    /// The security counter of the image rises further than the release key may raise it.
+    CounterStep {
+        /// The highest accepted counter.
+        most: u32,
+    },
+    /// The signing key of the image has been revoked: an image with keys of a higher generation has run.
     Revoked {
-        /// Number of the key.
-        key: u8,
+        /// The lowest accepted generation.
+        generation: u32,
     },
     /// The signature is not valid for this image and the key of this node.
     Signature,
@@ -87,6 +92,7 @@ impl Refusal {
             Refusal::Revoked { .. } => 71,
             Refusal::TakenBack { .. } => 72,
             Refusal::OnTrial => 73,
+            Refusal::CounterStep { .. } => 74,
         }
     }
 
@@ -96,9 +102,10 @@ impl Refusal {
         match self {
             Refusal::Board { expected } => (expected & 0xFFFF) as u16,
             Refusal::Hardware { revision } => revision.into(),
-            Refusal::Counter { least } => u16::try_from(least).unwrap_or(u16::MAX),
+            Refusal::Counter { least: number }
+            | Refusal::CounterStep { most: number }
+            | Refusal::Revoked { generation: number } => u16::try_from(number).unwrap_or(u16::MAX),
             Refusal::Crashes { count } => count.into(),
-            Refusal::Revoked { key } => key.into(),
             Refusal::TakenBack { reason: Reason::Starts } => 1,
             Refusal::TakenBack { reason: Reason::Withdrawn } => 2,
             _ => 0,

@@ -36,24 +36,32 @@ impl Message {
         self.0.update(code);
     }
 
-    /// The hash of all added bytes; the message is empty again.
-    pub(crate) fn end(&mut self) -> [u8; HASH_LEN] {
-        self.0.finalize_reset().into()
+    /// The hash of all added bytes.
+    pub(crate) fn end(self) -> [u8; HASH_LEN] {
+        self.0.finalize().into()
     }
+}
+
+/// The hash of these parts, one after the other.
+#[inline(never)] // Many callers, and little room in flash.
+pub(crate) fn hash(parts: &[&[u8]]) -> [u8; HASH_LEN] {
+    let mut hash = Sha512::new();
+    parts.iter().for_each(|part| hash.update(part));
+    hash.finalize().into()
 }
 
 /// Bytes of a hash.
 pub(crate) const HASH_LEN: usize = 64;
 /// Bytes of a number or a point.
-pub(crate) const LEN: usize = 32;
+const LEN: usize = 32;
 /// The octets before the hashed data (RFC 8032, 2: dom2), then phflag, then the length of the context.
 const DOMAIN: &[u8] = b"SigEd25519 no Ed25519 collisions\x01";
 
 /// The verification of a signature, which consists of a point R and a number S: whether \[S\]B = R + \[k\]A, where B is
 /// the base point, A the key, and k a hash of everything. \[S\]B - \[k\]A is computed and compared with R.
 pub(crate) struct Verification {
-    r: [u8; LEN],
-    s: [u8; LEN],
+    /// R, then S.
+    signature: [u8; SIGNATURE_LEN],
     k: [u8; HASH_LEN],
     key: [u8; KEY_LEN],
     /// -A.
@@ -64,9 +72,6 @@ pub(crate) struct Verification {
     rest: usize,
     /// \[S\]B - \[k\]A after the last step, compressed: the R that would make the signature valid. Zeros before.
     found: [u8; LEN],
-    /// The result, if a test has computed it before: the steps are then as many, and empty.
-    #[cfg(feature = "mock")]
-    known: Option<[u8; LEN]>,
 }
 
 impl Verification {
@@ -78,47 +83,55 @@ impl Verification {
         signature: &[u8; SIGNATURE_LEN],
         key: &[u8; KEY_LEN],
     ) -> Option<Verification> {
-        let (&r, rest) = signature.split_first_chunk()?;
-        let s = *rest.first_chunk()?;
+        let (r, s) = halves(signature);
+        if !is_reduced(s) {
+            return None;
+        }
         let minus_key = CompressedY(*key).decompressed().ok()?.neg();
         let length = u8::try_from(context.len()).ok()?;
-        let mut k = Sha512::new();
-        for part in [DOMAIN, &[length], context, &r, key, hash] {
-            k.update(part);
-        }
+        let k = self::hash(&[DOMAIN, &[length], context, r, key, hash]);
         let sum = EdwardsPoint::neutral_element();
-        let k = k.finalize().into();
-        let new = Verification {
-            r,
-            s,
+        Some(Verification {
+            signature: *signature,
             k,
             key: *key,
             minus_key,
             sum,
             rest: HASH_LEN,
             found: [0; LEN],
-            #[cfg(feature = "mock")]
-            known: crate::known::point(&(k, s, *key)),
-        };
-        is_reduced(&s).then_some(new)
+        })
     }
 
     /// Does one step of 65: a byte of the numbers, or finally the comparison. Returns whether the signature is valid
     /// after the last step.
     pub(crate) fn step(&mut self) -> Option<bool> {
+        #[cfg(feature = "mock")]
+        let known = crate::mock::known_point(&self.equation());
+        #[cfg(not(feature = "mock"))]
+        let known = None;
         if let Some(at) = self.rest.checked_sub(1) {
             self.rest = at;
-            self.add_byte(at);
+            if known.is_none() {
+                self.add_byte(at);
+            }
             None
         } else {
-            self.found = self.point();
-            Some(self.found == self.r)
+            self.found = known.unwrap_or_else(|| self.sum.compressed().0);
+            #[cfg(feature = "mock")]
+            crate::mock::learn_point(self.equation(), self.found);
+            Some(self.found == *halves(&self.signature).0)
         }
+    }
+
+    /// The numbers of \[S\]B - \[k\]A.
+    #[cfg(feature = "mock")]
+    fn equation(&self) -> std::vec::Vec<u8> {
+        [&halves(&self.signature).1[..], &self.k, &self.key].concat()
     }
 
     /// The result as a word, after the last step: see [`seal`].
     pub(crate) fn seal(&self, crc: u32) -> u32 {
-        seal(crc, &self.found, &self.r)
+        seal(crc, &self.found, halves(&self.signature).0)
     }
 
     /// The key used for the verification.
@@ -126,25 +139,10 @@ impl Verification {
         &self.key
     }
 
-    #[cfg(not(feature = "mock"))]
-    fn point(&self) -> [u8; LEN] {
-        self.sum.compressed().0
-    }
-
-    #[cfg(feature = "mock")]
-    fn point(&self) -> [u8; LEN] {
-        let point = self.known.unwrap_or_else(|| self.sum.compressed().0);
-        crate::known::keep((self.k, self.s, self.key), point);
-        point
-    }
-
     /// Doubles and adds for one byte of the numbers. S has no bits beyond its 32 bytes.
     fn add_byte(&mut self, at: usize) {
-        #[cfg(feature = "mock")]
-        if self.known.is_some() {
-            return;
-        }
-        let [k, s] = [self.k.get(at), self.s.get(at)].map(|byte| byte.copied().unwrap_or(0));
+        let [k, s] =
+            [self.k.get(at), halves(&self.signature).1.get(at)].map(|byte| byte.copied().unwrap_or(0));
         let base = EdwardsPoint::basepoint();
         for bit in (0..8).rev() {
             self.sum = self.sum.add(&self.sum);
@@ -154,6 +152,15 @@ impl Verification {
                 }
             }
         }
+    }
+}
+
+/// R and S of a signature.
+fn halves(signature: &[u8; SIGNATURE_LEN]) -> (&[u8; LEN], &[u8; LEN]) {
+    let (halves, _) = signature.as_chunks();
+    match halves {
+        [r, s] => (r, s),
+        _ => (&[0; LEN], &[0; LEN]),
     }
 }
 

@@ -74,7 +74,13 @@ impl fmt::Display for Status {
                 "the new program was not confirmed in time, or was taken back; the one before is back",
             ),
             73 => f.write_str("the program is on trial: confirm it or take it back before the next update"),
-            71 => write!(f, "the key number {detail}, with which the image is signed, is revoked"),
+            71 => {
+                write!(f, "the key of the image is revoked (the node asks for generation {detail} or more)")
+            }
+            74 => write!(
+                f,
+                "the security counter rises too far (the node takes {detail} at most without a key list that allows more)"
+            ),
             code => write!(f, "error {code} of the manufacturer, detail {detail}"),
         }
     }
@@ -88,7 +94,7 @@ mod tests {
     use super::*;
     use crate::trial::Reason;
 
-    const ALL: [Refusal; 19] = [
+    const ALL: [Refusal; 20] = [
         Refusal::NoProgram,
         Refusal::UnknownFormat,
         Refusal::HeaderCrc,
@@ -105,7 +111,8 @@ mod tests {
         Refusal::Truncated,
         Refusal::Excess,
         Refusal::Crashes { count: 3 },
-        Refusal::Revoked { key: 1 },
+        Refusal::Revoked { generation: 1 },
+        Refusal::CounterStep { most: 70_000 },
         Refusal::TakenBack { reason: Reason::Starts },
         Refusal::OnTrial,
     ];
@@ -129,7 +136,8 @@ mod tests {
             (Refusal::Counter { least: 9 }, 9),
             (Refusal::Counter { least: 70_000 }, u16::MAX),
             (Refusal::Crashes { count: 5 }, 5),
-            (Refusal::Revoked { key: 1 }, 1),
+            (Refusal::Revoked { generation: 1 }, 1),
+            (Refusal::CounterStep { most: 25 }, 25),
             (Refusal::TakenBack { reason: Reason::Withdrawn }, 2),
             (Refusal::Signature, 0),
         ] {

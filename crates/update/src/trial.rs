@@ -23,8 +23,7 @@ use core::ops::Range;
 use crate::area::{Area, Layout};
 use crate::crashes::Crashes;
 use crate::flash::Flash;
-use crate::header::HEADER;
-use crate::image;
+use crate::header::{HEADER, Header};
 use crate::record::{Commit, RECORD_ROOM, Record, is_zero, mark};
 use crate::refusal::Refusal;
 
@@ -144,8 +143,9 @@ pub(crate) fn fail<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refus
 fn is_another<F: Flash>(flash: &mut F, layout: &Layout, area: Area) -> bool {
     let mut crc = [0; 4];
     let is_read = flash.read(area.start().saturating_add(HEADER - 4), &mut crc).is_ok();
-    let application = image::header(flash, layout.application());
-    is_read && application.is_ok_and(|header| header.crc().to_le_bytes() != crc)
+    let mut header = Header::EMPTY;
+    let is_whole = header.read(flash, layout.application()).is_ok();
+    is_read && is_whole && header.crc() != u32::from_le_bytes(crc)
 }
 
 /// Counts an unrequested start.
@@ -171,7 +171,7 @@ fn strikes<F: Flash>(flash: &mut F, layout: &Layout) -> u32 {
 }
 
 fn is_set<F: Flash>(flash: &mut F, layout: &Layout, number: u32) -> bool {
-    is_zero(flash, place(layout, number)).unwrap_or(false)
+    is_zero(flash, place(layout, number), u8::MAX)
 }
 
 fn place(layout: &Layout, number: u32) -> u32 {

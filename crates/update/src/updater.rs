@@ -225,8 +225,9 @@ impl<F: Flash> Updater<F> {
         }
         trial::fail(&mut self.flash, layout)?;
         let kept = layout.kept();
-        let header = image::admitted(&mut self.flash, &self.target, kept);
-        self.check(Plan::Revert, header.map(|header| FullCheck::of(&header, kept, true)))
+        let mut header = Header::EMPTY;
+        let admitted = image::admitted(&mut self.flash, &self.target, kept, &mut header);
+        self.check(Plan::Revert, admitted.map(|()| FullCheck::of(&header, kept, true)))
     }
 
     /// Starts a check.
@@ -357,9 +358,10 @@ impl<F: Flash> Updater<F> {
     /// this application if the copy was cut.
     fn keep(&mut self, staged: &Header) -> Result<(), Refusal> {
         let application = self.target.layout.application();
+        let mut header = Header::EMPTY;
         if self.has_kept() {
             self.kept().close(&mut self.flash)?;
-        } else if let Ok(header) = image::header(&mut self.flash, application) {
+        } else if header.read(&mut self.flash, application).is_ok() {
             self.state = State::Checking(FullCheck::of(&header, application, false), Plan::Keep);
             return Ok(());
         }
@@ -389,8 +391,8 @@ impl<F: Flash> Updater<F> {
 
     /// Installs the staged image, which was found valid before the application was kept.
     fn install_staged(&mut self) -> Result<(), Refusal> {
-        let header = image::candidate(&mut self.flash, &self.target)?;
-        self.replace(Plan::Install, &header);
+        let check = FullCheck::new(&mut self.flash, &self.target)?;
+        self.replace(Plan::Install, check.header());
         Ok(())
     }
 

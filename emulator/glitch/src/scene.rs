@@ -7,6 +7,7 @@ use bsp::sectors;
 use bsp::update_layout::LAYOUT;
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
+use update::key::{Certificate, KeyList};
 use update::mock::MockFlash;
 use update::{
     Decision, Description, Flash, HEADER_LEN, Next, Phase, Start, Status, Target, Trial, Updater, Version,
@@ -60,6 +61,12 @@ impl Scene {
                 bare(&neutral()?.to_bytes()),
                 Begin::Power,
             ),
+            alone(
+                "certified",
+                "an application whose release key nobody has certified",
+                bare(&certified()?.to_bytes()),
+                Begin::Power,
+            ),
             alone("bare", "an application without a header", bare(&headless), Begin::Power),
             alone(
                 "exchanged",
@@ -83,7 +90,11 @@ impl Scene {
     }
 }
 
-static PUBLIC_KEYS: LazyLock<[[u8; 32]; 1]> = LazyLock::new(|| [owner().verifying_key().to_bytes()]);
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 3]> = LazyLock::new(|| {
+    let others = [[0x43; 32], [0x44; 32]].map(|secret| SigningKey::from_bytes(&secret));
+    let [root, recovery] = others.map(|key| key.verifying_key().to_bytes());
+    [owner().verifying_key().to_bytes(), root, recovery]
+});
 
 fn owner() -> SigningKey {
     SigningKey::from_bytes(&OWNER)
@@ -114,6 +125,16 @@ fn neutral() -> Result<Image> {
     let mut signature = [0; 64];
     signature[0] = 1;
     with_signature(signature)
+}
+
+/// The signature is good, of a release key that the list names without a signature of the root key.
+fn certified() -> Result<Image> {
+    let thief = SigningKey::from_bytes(&[0x66; 32]);
+    let key = thief.verifying_key().to_bytes();
+    let certificate = Certificate { generation: 1, counter: 0, key, signature: [0; 64] };
+    let image = signed(BAD, NEWER)?;
+    let keys = KeyList { release: Some(certificate), root: None };
+    Image::sign(Description { keys, ..image.header.description() }, image.code, &thief)
 }
 
 fn with_signature(signature: [u8; 64]) -> Result<Image> {

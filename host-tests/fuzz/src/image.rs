@@ -11,8 +11,8 @@ use update::{
 };
 
 /// Sectors: security counter; application in two sectors; staging in two; the kept image in two.
-const SECTORS: [usize; 7] = [256, 512, 512, 512, 1024, 512, 1024];
-const APPLICATION: usize = 256;
+const SECTORS: [usize; 7] = [1280, 512, 512, 512, 1024, 512, 1024];
+const APPLICATION: usize = 1280;
 const BOARD: u32 = 0x8271;
 /// Number of polls that no step of an update exceeds.
 const POLLS: u32 = 2000;
@@ -67,15 +67,15 @@ fn keys() -> salty::Keypair {
     salty::Keypair::from(&[7; 32])
 }
 
-static PUBLIC_KEYS: LazyLock<[[u8; 32]; 1]> = LazyLock::new(|| [keys().public.to_bytes()]);
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 3]> = LazyLock::new(|| [keys().public.to_bytes(); 3]);
 
 fn target() -> Target {
-    let application = Area::new(256, &[512, 512]);
+    let application = Area::new(1280, &[512, 512]);
     let layout = Layout::new(
-        Area::new(0, &[256]),
+        Area::new(0, &[1280]),
         application,
-        Area::new(1280, &[512, 1024]),
-        Area::new(2816, &[512, 1024]),
+        Area::new(2304, &[512, 1024]),
+        Area::new(3840, &[512, 1024]),
     );
     Target { layout: layout.expect("they fit"), board: BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
 }
@@ -86,7 +86,7 @@ fn image(major: u16, len: usize) -> Image {
         Description { board: BOARD, hardware: 1, version, counter: 1, ..Description::default() };
     let code: Vec<u8> = (1..=u8::MAX).cycle().skip(usize::from(major)).take(len).collect();
     let header = Header::describe(description, &code).expect("it fits");
-    let hash = salty::Sha512::new().updated(&header.signed_part()).updated(&code).finalize();
+    let hash = salty::Sha512::new().updated(header.signed_part()).updated(&code).finalize();
     let header = header.with_signature(keys().sign_prehashed(&hash, Some(CONTEXT)).to_bytes());
     (header, [&header.encode()[..], &code].concat())
 }

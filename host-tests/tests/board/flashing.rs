@@ -14,16 +14,16 @@ const FLASH: usize = 0x0800_0000;
 const PARAMETERS: Range<usize> = 0x8000..0x1_0000;
 
 fn content(key: SigningKey) -> Result<Content, String> {
-    content_of("bootloader", key, None)
+    content_of("bootloader", key, &[])
 }
 
-fn content_of(name: &str, key: SigningKey, second: Option<SigningKey>) -> Result<Content, String> {
+fn content_of(name: &str, key: SigningKey, others: &[SigningKey]) -> Result<Content, String> {
     let bootloader = std::fs::read(images().join(name)).unwrap();
-    let second = second.map(|key| key.verifying_key());
-    Content::new(&bootloader, &firmware(), key, second).map_err(|error| format!("{error:#}"))
+    let others = others.iter().map(SigningKey::verifying_key).collect();
+    Content::new(&bootloader, &firmware(), key, others).map_err(|error| format!("{error:#}"))
 }
 
-/// The first line says which bootloader is written and what it starts. With both keys of an owner it is the owner's.
+/// The first line says which bootloader is written and what it starts. With the three keys of an owner it is the owner's.
 #[test]
 fn the_first_line_names_the_bootloader_and_what_it_starts() {
     let first_line = |content: Content| content.to_string().lines().next().unwrap().to_owned();
@@ -32,20 +32,24 @@ fn the_first_line_names_the_bootloader_and_what_it_starts() {
         development,
         "DEVELOPMENT bootloader: it starts every program, signed or not; not for production"
     );
-    let [first, second] = [[0x42; 32], [0x43; 32]].map(|secret| SigningKey::from_bytes(&secret));
-    let owner = first_line(content_of("bootloader-owner", first.clone(), Some(second.clone())).unwrap());
-    let digits = [&first, &second].map(key::public_digits);
+    let [first, others @ ..] =
+        [[0x42; 32], [0x43; 32], [0x44; 32]].map(|secret| SigningKey::from_bytes(&secret));
+    let owner = first_line(content_of("bootloader-owner", first.clone(), &others).unwrap());
+    let [root, recovery] = &others;
+    let [first, root, recovery] = [&first, root, recovery].map(key::public_digits);
     assert_eq!(
         owner,
-        format!("bootloader of an owner: it starts only programs signed with {}", digits.join(" or "))
+        format!(
+            "bootloader of an owner: it starts only programs signed with the key of {first}, which may be replaced by that of \
+             {root}, which may be replaced by that of {recovery}"
+        )
     );
 }
 
 #[test]
-fn a_bootloader_without_the_second_key_is_not_written() {
-    let second = SigningKey::from_bytes(&[7; 32]);
-    let refused =
-        content_of("bootloader-owner", SigningKey::from_bytes(&[0x42; 32]), Some(second)).unwrap_err();
+fn a_bootloader_with_another_root_key_is_not_written() {
+    let other = SigningKey::from_bytes(&[7; 32]);
+    let refused = content_of("bootloader-owner", SigningKey::from_bytes(&[0x42; 32]), &[other]).unwrap_err();
     assert!(refused.contains("another key"), "{refused}");
 }
 

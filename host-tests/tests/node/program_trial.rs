@@ -61,11 +61,11 @@ fn left_alone(limit: u16, automatic: u16) -> Bench {
 fn the_programs_in_the_flash_are_read_by_an_object_of_every_personality() {
     for personality in Personality::ALL {
         let mut bench = Bench::booted_as(personality);
-        let programs = Programs { counter: 7, revoked_keys: 0x88, staged: 0x0102_0304, kept: 0x0506_0708 };
+        let programs = Programs { counter: 7, generation: 0x28, staged: 0x0102_0304, kept: 0x0506_0708 };
         bench.protocol.set_programs(programs);
         bench.restart();
         let mut read = |sub| bench.read(0x2004, sub).unwrap();
-        assert_eq!((read(2), read(3)), (vec![7, 0, 0, 0], vec![0x88]), "{personality:?}");
+        assert_eq!((read(2), read(3)), (vec![7, 0, 0, 0], vec![0x28]), "{personality:?}");
         assert_eq!((read(4), read(5)), (vec![4, 3, 2, 1], vec![8, 7, 6, 5]), "{personality:?}");
         assert!(bench.write(0x2004, 2, &[0; 4]).is_err());
     }

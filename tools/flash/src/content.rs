@@ -29,12 +29,13 @@ pub struct Content {
     bootloader: Vec<Part>,
     image: Image,
     key: SigningKey,
-    second: Option<VerifyingKey>,
+    /// The root key and the recovery key of an owner.
+    others: Vec<VerifyingKey>,
 }
 
 impl Content {
-    /// Makes the content from the ELF files of both programs. The application is signed with `key`. `second` is the other
-    /// key of an owner.
+    /// Makes the content from the ELF files of both programs. The application is signed with `key`. `others` are the
+    /// root key and the recovery key of an owner.
     ///
     /// # Errors
     /// One of the files is not for this board, or the bootloader does not trust these keys, or it trusts the development
@@ -43,11 +44,11 @@ impl Content {
         bootloader: &[u8],
         application: &[u8],
         key: SigningKey,
-        second: Option<VerifyingKey>,
+        others: Vec<VerifyingKey>,
     ) -> Result<Content> {
         let bootloader = segments(bootloader).context("the bootloader")?;
         let image = product::image(application, &key).context("the application")?;
-        let content = Content { bootloader, image, key, second };
+        let content = Content { bootloader, image, key, others };
         for key in content.keys() {
             ensure!(
                 content.trusts(&key.to_bytes()),
@@ -65,7 +66,7 @@ impl Content {
     }
 
     fn keys(&self) -> impl Iterator<Item = VerifyingKey> {
-        [self.key.verifying_key()].into_iter().chain(self.second)
+        [self.key.verifying_key()].into_iter().chain(self.others.iter().copied())
     }
 
     /// The parts, by rising addresses.
@@ -98,7 +99,11 @@ impl fmt::Display for Content {
             )?;
         } else {
             let keys: Vec<_> = self.keys().map(|key| hex::encode(key.to_bytes())).collect();
-            writeln!(f, "bootloader of an owner: it starts only programs signed with {}", keys.join(" or "))?;
+            writeln!(
+                f,
+                "bootloader of an owner: it starts only programs signed with the key of {}",
+                keys.join(", which may be replaced by that of ")
+            )?;
         }
         for Part { what, address, bytes } in self.parts() {
             let (length, crc) = (bytes.len(), checksum::of(&bytes));

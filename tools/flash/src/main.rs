@@ -28,9 +28,12 @@ struct Cli {
     /// The secret key of the owner to sign with, PKCS#8 in PEM
     #[arg(long)]
     key: Option<PathBuf>,
-    /// The second key that the bootloader must trust: the 64 digits of its public half
-    #[arg(long, requires = "key", value_name = "DIGITS")]
-    second_key: Option<String>,
+    /// The root key that the bootloader must have: the 64 digits of its public half
+    #[arg(long, requires = "key", value_name = "DIGITS", required_unless_present = "development")]
+    root_key: Option<String>,
+    /// The recovery key that the bootloader must have: the 64 digits of its public half
+    #[arg(long, requires = "root_key", value_name = "DIGITS")]
+    recovery_key: Option<String>,
     /// Print what would be written, and the calls of probe-rs, and make none
     #[arg(long)]
     dry_run: bool,
@@ -55,8 +58,9 @@ fn run(cli: &Cli) -> Result<()> {
     let development = key::development_path();
     let key =
         key::read(if cli.development { &development } else { cli.key.as_ref().unwrap_or(&development) })?;
-    let second = cli.second_key.as_deref().map(key::public).transpose()?;
-    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, second)?;
+    let others = cli.root_key.iter().chain(&cli.recovery_key);
+    let others = others.map(|digits| key::public(digits)).collect::<Result<Vec<_>>>()?;
+    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, others)?;
     println!("{content}");
     if !cli.dry_run {
         probe::check_version().map_err(anyhow::Error::msg)?;

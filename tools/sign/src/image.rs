@@ -39,7 +39,7 @@ impl Image {
         let header = Header::parse(header)?;
         let length = header.length() as usize;
         ensure!(code.len() == length, "{} bytes of code, and the header says {length}", code.len());
-        let again = Header::describe(*header.description(), code);
+        let again = Header::describe(header.description(), code);
         ensure!(
             again.is_some_and(|again| again.code_crc() == header.code_crc()),
             "the CRC of the code is wrong"

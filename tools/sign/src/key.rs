@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use ed25519_dalek::pkcs8::{DecodePrivateKey, EncodePrivateKey, KeypairBytes};
 use ed25519_dalek::{Digest, Sha512, SigningKey, VerifyingKey};
-use update::key::DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
+use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, Rank};
 
 /// The source of the development key, so that anybody can make it again.
 pub const DEVELOPMENT_SENTENCE: &str = "This development key is known to everybody and protects nothing.";
@@ -76,10 +76,16 @@ pub fn write(key: &SigningKey, path: &Path) -> Result<()> {
     file.write_all(pem(key)?.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// The public half as the variable that a bootloader is built with: `UPDATE_PUBLIC_KEY` and 64 hexadecimal digits.
+/// The public half as the variable that a bootloader is built with, for a key of this rank: its name and 64 hexadecimal
+/// digits.
 #[must_use]
-pub fn variable(key: &SigningKey) -> String {
-    format!("UPDATE_PUBLIC_KEY={}", public_digits(key))
+pub fn variable(key: &SigningKey, rank: Rank) -> String {
+    let name = match rank {
+        Rank::Release => "UPDATE_RELEASE_KEY",
+        Rank::Root => "UPDATE_ROOT_KEY",
+        Rank::Recovery => "UPDATE_RECOVERY_KEY",
+    };
+    format!("{name}={}", public_digits(key))
 }
 
 /// The public key with these 64 hexadecimal digits.

@@ -6,4 +6,5 @@
 pub mod code;
 pub mod image;
 pub mod key;
+pub mod key_list;
 pub mod product;

@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail, ensure};
 use bsp::update_layout::LAYOUT;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use sign::product::{self, version};
-use sign::{code, image::Image, key};
+use sign::{code, image::Image, key, key_list};
+use update::key::{KeyList, Rank};
 use update::{Description, Version};
 
 /// Keys and signed images for the field update.
@@ -24,12 +25,20 @@ enum Command {
     Key {
         /// The new file
         file: PathBuf,
+        /// The rank of the key in the bootloader
+        #[arg(long, value_enum, default_value = "release")]
+        rank: RankName,
     },
     /// Print the public half of a key
     Public {
         /// The secret key, PKCS#8 in PEM
         file: PathBuf,
+        /// The rank of the key in the bootloader
+        #[arg(long, value_enum, default_value = "release")]
+        rank: RankName,
     },
+    /// Certify a release key with the root key, or a root key with the recovery key
+    KeyList(KeyListArgs),
     /// Sign an application, an ELF file or a flat binary
     Image(ImageArgs),
     /// Show the content of an image, and check it
@@ -40,6 +49,49 @@ enum Command {
         #[arg(long)]
         key: Option<PathBuf>,
     },
+}
+
+/// The rank of a key.
+#[derive(Clone, Copy, ValueEnum)]
+enum RankName {
+    Release,
+    Root,
+    Recovery,
+}
+
+impl From<RankName> for Rank {
+    fn from(name: RankName) -> Rank {
+        match name {
+            RankName::Release => Rank::Release,
+            RankName::Root => Rank::Root,
+            RankName::Recovery => Rank::Recovery,
+        }
+    }
+}
+
+#[derive(Args)]
+struct KeyListArgs {
+    /// The secret key that signs: the root key, or with --root the recovery key
+    #[arg(long)]
+    key: PathBuf,
+    /// The release key: the 64 digits of its public half
+    #[arg(long, value_name = "DIGITS", required_unless_present = "root", conflicts_with = "root")]
+    release: Option<String>,
+    /// The root key: the 64 digits of its public half
+    #[arg(long, value_name = "DIGITS")]
+    root: Option<String>,
+    /// The number of the key: each one revokes those with lower numbers
+    #[arg(long)]
+    number: u32,
+    /// The security counter from which the release key may raise it
+    #[arg(long, default_value_t = 0, conflicts_with = "root")]
+    counter: u32,
+    /// The key list of a root key that is not that of the bootloader
+    #[arg(long, value_name = "FILE", conflicts_with = "root")]
+    after: Option<PathBuf>,
+    /// The file for the key list
+    #[arg(long, short)]
+    out: PathBuf,
 }
 
 #[derive(Args)]
@@ -61,12 +113,9 @@ struct ImageArgs {
     /// The security counter: raise it when no older image may ever run again
     #[arg(long, default_value_t = 0)]
     counter: u32,
-    /// The number of the key in the bootloader: 0 for UPDATE_PUBLIC_KEY, 1 for UPDATE_PUBLIC_KEY_2
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..2))]
-    key_number: u8,
-    /// A key that no node accepts any more where this image has run
-    #[arg(long, value_parser = clap::value_parser!(u8).range(0..2))]
-    revokes: Option<u8>,
+    /// The key list with the release key [default: the release key is that of the bootloader]
+    #[arg(long, value_name = "FILE")]
+    key_list: Option<PathBuf>,
     /// The file for the image [default: the name of the file with .img]
     #[arg(long, short)]
     out: Option<PathBuf>,
@@ -92,11 +141,41 @@ fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
-fn make_key(path: &Path) -> Result<()> {
+fn make_key(path: &Path, rank: RankName) -> Result<()> {
     let key = key::random()?;
     key::write(&key, path)?;
-    println!("{}", key::variable(&key));
+    println!("{}", key::variable(&key, rank.into()));
     Ok(())
+}
+
+fn read_key_list(path: Option<&Path>) -> Result<KeyList> {
+    let Some(path) = path else { return Ok(KeyList::default()) };
+    key_list::read(&read(path)?).with_context(|| path.display().to_string())
+}
+
+fn make_key_list(args: &KeyListArgs) -> Result<()> {
+    let by = signing_key(Some(&args.key))?;
+    let list = match (&args.root, &args.release) {
+        (Some(root), _) => key_list::with_root(&key::public(root)?, args.number, &by)?,
+        (None, release) => {
+            let key = key::public(release.as_deref().unwrap_or_default())?;
+            let before = read_key_list(args.after.as_deref())?;
+            key_list::with_release(before, &key, args.number, args.counter, &by)?
+        }
+    };
+    std::fs::write(&args.out, list.encode())
+        .with_context(|| format!("cannot write {}", args.out.display()))?;
+    show_keys(&list);
+    Ok(())
+}
+
+fn show_keys(list: &KeyList) {
+    println!("generation  {}", list.generation());
+    for (name, certificate) in [("root", list.root), ("release", list.release)] {
+        if let Some(certificate) = certificate {
+            println!("{name:<12}{}", hex::encode(certificate.key));
+        }
+    }
 }
 
 fn make_image(args: &ImageArgs) -> Result<()> {
@@ -109,16 +188,14 @@ fn make_image(args: &ImageArgs) -> Result<()> {
         LAYOUT.highest_counter(),
         args.counter
     );
-    let revokes = args.revokes.iter().fold(0, |mask, number| mask | 1 << number);
-    ensure!(revokes >> args.key_number & 1 == 0, "an image cannot revoke the key that it is signed with");
-    let description = Description {
-        board: args.board,
-        hardware,
-        version: args.version,
-        counter: args.counter,
-        key: args.key_number,
-        revokes,
-    };
+    let keys = read_key_list(args.key_list.as_deref())?;
+    let is_of_list = keys.release.is_none_or(|release| release.key == key.verifying_key().to_bytes());
+    ensure!(
+        is_of_list && (keys.release.is_some() || keys.root.is_none()),
+        "the key is not the release key of the list"
+    );
+    let description =
+        Description { board: args.board, hardware, version: args.version, counter: args.counter, keys };
     let image = Image::sign(description, code, &key)?;
     let out = args.out.clone().unwrap_or_else(|| args.file.with_extension("img"));
     std::fs::write(&out, image.to_bytes()).with_context(|| format!("cannot write {}", out.display()))?;
@@ -135,10 +212,7 @@ fn show(image: &Image) {
     println!("board       {:#010x}", about.board);
     println!("hardware    {}", revisions.join(", "));
     println!("counter     {}", about.counter);
-    println!("key         number {}", about.key);
-    if let Some(revoked) = (0..8).find(|key| about.revokes >> key & 1 != 0) {
-        println!("revokes     key number {revoked}");
-    }
+    show_keys(&about.keys);
     println!("code        {} bytes, CRC-32 {:#010x} (1F56h)", image.header.length(), image.header.code_crc());
 }
 
@@ -154,8 +228,11 @@ fn show_file(file: &Path, key: Option<&Path>) -> Result<()> {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Key { file } => make_key(&file),
-        Command::Public { file } => key::read(&file).map(|key| println!("{}", key::variable(&key))),
+        Command::Key { file, rank } => make_key(&file, rank),
+        Command::KeyList(args) => make_key_list(&args),
+        Command::Public { file, rank } => {
+            key::read(&file).map(|key| println!("{}", key::variable(&key, rank.into())))
+        }
         Command::Image(args) => make_image(&args),
         Command::Show { file, key } => show_file(&file, key.as_deref()),
     };

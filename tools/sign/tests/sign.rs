@@ -2,8 +2,8 @@
 
 use bsp::update_layout::LAYOUT;
 use sign::image::Image;
-use sign::{code, key};
-use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_PUBLISHED_KEY, PUBLIC_KEYS};
+use sign::{code, key, key_list};
+use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_PUBLISHED_KEY, KeyList, PUBLIC_KEYS, Rank};
 use update::mock::MockFlash;
 use update::{Decision, Description, HEADER_LEN, Next, Start, Status, Target, Updater, Version, boot};
 
@@ -61,10 +61,15 @@ fn the_development_key_is_the_one_in_the_file_and_in_the_bootloader() {
     let key = key::development();
     assert_eq!(std::fs::read_to_string(key::development_path()).unwrap(), key::pem(&key).unwrap());
     assert_eq!(key::read(&key::development_path()).unwrap(), key);
-    assert_eq!(key.verifying_key().to_bytes(), DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, "{}", key::variable(&key));
+    assert_eq!(
+        key.verifying_key().to_bytes(),
+        DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
+        "{}",
+        key::variable(&key, Rank::Release)
+    );
     assert!(key::is_development(&key));
     assert!(!key::is_development(&key::random().unwrap()));
-    assert!(HAS_PUBLISHED_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 2]);
+    assert!(HAS_PUBLISHED_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 3]);
 }
 
 #[test]
@@ -140,4 +145,28 @@ fn what_is_no_application_is_refused() {
         assert!(error.contains(words), "{error}");
     }
     assert_eq!(code::read(&[1, 2, 3]).unwrap(), [1, 2, 3, 0xFF]);
+}
+
+/// A bootloader with the development key in all ranks takes an image of the release key that the list certifies.
+#[test]
+fn a_node_runs_what_the_release_key_of_a_key_list_signs() {
+    let (by, root, release) = (key::development(), key::random().unwrap(), key::random().unwrap());
+    let roots = key_list::with_root(&root.verifying_key(), 1, &by).unwrap();
+    let of_root = key_list::with_release(roots, &release.verifying_key(), 2, 0, &root).unwrap();
+    let of_bootloader =
+        key_list::with_release(KeyList::default(), &release.verifying_key(), 1, 0, &by).unwrap();
+    let mut flash = flash();
+    for (generation, keys) in [(1, of_bootloader), (18, of_root)] {
+        assert_eq!(key_list::read(&keys.encode()).unwrap(), keys);
+        assert_eq!(keys.generation(), generation);
+        let image = Image::sign(Description { keys, ..description() }, vec![1; 64], &release).unwrap();
+        assert_eq!(update(&mut flash, &image.to_bytes()), Status::GOOD);
+        assert_eq!(boot(&mut flash, &target(), Start::default()), Decision::Start(image.header));
+        update::Trial::confirm(&mut flash, &LAYOUT).unwrap();
+        boot(&mut flash, &target(), Start::default());
+    }
+    assert!(key_list::with_release(KeyList::default(), &release.verifying_key(), 0, 0, &by).is_err());
+    assert!(key_list::with_release(KeyList::default(), &release.verifying_key(), 16, 0, &by).is_err());
+    assert!(key_list::with_release(roots, &release.verifying_key(), 1, 0, &by).is_err(), "another root key");
+    assert!(key_list::with_root(&root.verifying_key(), 4, &by).is_err());
 }

@@ -70,7 +70,7 @@ pub const PROGRAM_STATE_ROWS: &[Object] = &[
     Object::highest(PROGRAM_STATE, 5, "Program state"),
     fact(1, "Board", Type::Unsigned32).value(product::BOARD as i64),
     fact(2, "Security counter", Type::Unsigned32),
-    fact(3, "Revoked keys", Type::Unsigned8),
+    fact(3, "Key generation", Type::Unsigned8),
     fact(4, "Downloaded program", Type::Unsigned32),
     fact(5, "Kept program", Type::Unsigned32),
 ];

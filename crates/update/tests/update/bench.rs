@@ -2,36 +2,46 @@
 
 use std::sync::LazyLock;
 
+use update::key::{Certificate, KEYS_CONTEXT};
 use update::mock::MockFlash;
 use update::{
     Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Reset, Start, Status,
     Target, Trial, Updater, Version, boot,
 };
 
-/// Sectors of the mock: security counter and revoked keys; application in two; staging in two; the kept image in two.
-pub(crate) const SECTORS: [usize; 7] = [512, 1024, 2048, 2048, 2048, 2048, 2048];
-pub(crate) const APPLICATION: usize = 512;
-pub(crate) const STAGING: usize = 512 + 3072;
-const SECURITY_AREA: Area = Area::new(0, &[512]);
-const APPLICATION_AREA: Area = Area::new(512, &[1024, 2048]);
-const STAGING_AREA: Area = Area::new(512 + 3072, &[2048, 2048]);
-const KEPT_AREA: Area = Area::new(512 + 3072 + 4096, &[2048, 2048]);
+/// Sectors of the mock: security counter and key generation; application in two; staging in two; the kept image in two.
+pub(crate) const SECTORS: [usize; 7] = [1536, 1024, 2048, 2048, 2048, 2048, 2048];
+pub(crate) const APPLICATION: usize = 1536;
+pub(crate) const STAGING: usize = 1536 + 3072;
+const SECURITY_AREA: Area = Area::new(0, &[1536]);
+const APPLICATION_AREA: Area = Area::new(1536, &[1024, 2048]);
+const STAGING_AREA: Area = Area::new(1536 + 3072, &[2048, 2048]);
+const KEPT_AREA: Area = Area::new(1536 + 3072 + 4096, &[2048, 2048]);
 
 pub(crate) const BOARD: u32 = 0x0001_8271;
 pub(crate) const REVISION: u8 = 2;
 
-/// The first of the two keys that the test node trusts.
+/// The release key of the test node.
 pub(crate) fn keys() -> salty::Keypair {
     key_number(0)
 }
 
-/// One of the two keys.
+/// A key: 0 the release key, 1 the root key, 2 the recovery key of the test node; the others belong to nobody yet.
 pub(crate) fn key_number(number: u8) -> salty::Keypair {
     salty::Keypair::from(&[7 + number; 32])
 }
 
-static PUBLIC_KEYS: LazyLock<[[u8; 32]; 2]> =
-    LazyLock::new(|| [0, 1].map(|number| key_number(number).public.to_bytes()));
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 3]> =
+    LazyLock::new(|| [0, 1, 2].map(|number| key_number(number).public.to_bytes()));
+
+/// The certificate of a key, signed with another one.
+pub(crate) fn certificate(generation: u32, counter: u32, key: u8, by: u8) -> Certificate {
+    let key = key_number(key).public.to_bytes();
+    let certificate = Certificate { generation, counter, key, signature: [0; 64] };
+    let hash = salty::Sha512::new().updated(&certificate.signed_part()).finalize();
+    let signature = key_number(by).sign_prehashed(&hash, Some(KEYS_CONTEXT));
+    Certificate { signature: signature.to_bytes(), ..certificate }
+}
 
 pub(crate) fn target() -> Target {
     let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA, KEPT_AREA).unwrap();
@@ -68,7 +78,7 @@ impl Image {
     }
 
     pub(crate) fn hash(&self) -> [u8; 64] {
-        salty::Sha512::new().updated(&self.header.signed_part()).updated(&self.code).finalize()
+        salty::Sha512::new().updated(self.header.signed_part()).updated(&self.code).finalize()
     }
 
     pub(crate) fn with_signature(self, signature: salty::Signature) -> Image {

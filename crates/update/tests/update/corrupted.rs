@@ -81,14 +81,27 @@ fn headers() -> Vec<Kind> {
         ("code without a header", image_b().code, Refusal::UnknownFormat),
         ("an ELF file", [b"\x7fELF\x01\x01\x01".to_vec(), noise(3, 1193)].concat(), Refusal::UnknownFormat),
         ("another magic number", header(flip(0)), Refusal::UnknownFormat),
-        ("another format", header(put(4, 2)), Refusal::UnknownFormat),
+        ("the format before", header(put(4, 1)), Refusal::UnknownFormat),
         ("a bit of the header flipped", bytes(flip(17)), Refusal::HeaderCrc),
         ("a bit of the reserved bytes flipped", bytes(flip(300)), Refusal::HeaderCrc),
         ("a bit of the header's CRC flipped", bytes(flip(HEADER - 1)), Refusal::HeaderCrc),
         ("reserved bytes in use", header(put(300, 1)), Refusal::HeaderContent),
-        ("a number that no key has", header(put(20, 8 << 16)), Refusal::HeaderContent),
-        ("a key that revokes itself", header(put(20, 1 << 24)), Refusal::HeaderContent),
-        ("a counter that cannot be kept", signed(|about| about.counter = 25), Refusal::HeaderContent),
+        ("reserved bytes in use behind the version", header(put(20, 8 << 16)), Refusal::HeaderContent),
+        ("a certificate of no generation", header(put(36 + 8, 1)), Refusal::HeaderContent),
+        (
+            "a root certificate of no generation",
+            certified(1, 0, |bytes| put(140 + 8, 1)(bytes)),
+            Refusal::HeaderContent,
+        ),
+        ("a generation that cannot be kept", certified(64, 64, |_| ()), Refusal::HeaderContent),
+        ("a release key of another root key", certified(17, 0, |_| ()), Refusal::HeaderContent),
+        ("a root key without a release key", header(put(140, 16)), Refusal::HeaderContent),
+        ("a counter that cannot be kept", signed(|about| about.counter = 33), Refusal::HeaderContent),
+        (
+            "a counter that rises too far",
+            signed(|about| about.counter = 17),
+            Refusal::CounterStep { most: 16 },
+        ),
         ("no code by the header", header(put(24, 0)), Refusal::HeaderContent),
         ("no whole number of words", header(put(24, 618)), Refusal::HeaderContent),
         ("a length beyond the area", header(put(24, 10_000)), Refusal::TooLong),
@@ -101,6 +114,15 @@ fn headers() -> Vec<Kind> {
         ("a lower security counter", signed(|about| about.counter = 4), counter),
         ("the lowest security counter", signed(|about| about.counter = 0), counter),
     ]
+}
+
+/// The image with the certificates of these generations, which nobody has signed, and good sums.
+fn certified(release: u32, root: u32, change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
+    header(|bytes| {
+        put(36, release)(bytes);
+        put(140, root)(bytes);
+        change(bytes);
+    })
 }
 
 fn contents() -> Vec<Kind> {
@@ -120,9 +142,8 @@ fn contents() -> Vec<Kind> {
         ("a newer version by hand", header(put(16, 9)), Refusal::Signature),
         ("a higher counter by hand", header(put(32, 6)), Refusal::Signature),
         ("more hardware by hand", header(put(12, u32::MAX)), Refusal::Signature),
-        ("the other key by hand", header(put(20, 3 | 1 << 16)), Refusal::Signature),
-        ("a revocation by hand", header(put(20, 3 | 2 << 24)), Refusal::Signature),
-        ("a key that the node has not", signed(|about| about.key = 2), Refusal::Signature),
+        ("a certificate by hand", certified(1, 0, |_| ()), Refusal::Signature),
+        ("certificates by hand", certified(17, 16, |_| ()), Refusal::Signature),
     ]
 }
 
@@ -144,7 +165,7 @@ fn signatures() -> Vec<Kind> {
         ("R and S exchanged", header(|bytes| bytes[SIGNED_LEN..HEADER].rotate_left(32))),
         ("S not reduced (RFC 8032, 5.1.7)", malleable),
         ("the key of a stranger", stranger.bytes()),
-        ("the other key of the node", b.clone().signed_by(&key_number(1)).bytes()),
+        ("the root key of the node", b.clone().signed_by(&key_number(1)).bytes()),
         ("the signature of another image", transplanted.bytes()),
         ("plain Ed25519", with(plain)),
         ("plain Ed25519 of the hash", with(of_hash)),

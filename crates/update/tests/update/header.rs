@@ -2,16 +2,30 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use update::key::{Certificate, GENERATIONS, KeyList, root_generation};
 use update::{Description, HEADER_LEN, Header, Refusal, SIGNATURE_LEN, SIGNED_LEN, Version};
 
 fn description() -> impl Strategy<Value = Description> {
     let version = any::<[u16; 3]>().prop_map(|[major, minor, patch]| Version { major, minor, patch });
-    (any::<u32>(), any::<u32>(), version, any::<u32>(), 0..8_u8, any::<u8>()).prop_map(
-        |(board, hardware, version, counter, key, revokes)| {
-            let revokes = revokes & !(1 << key);
-            Description { board, hardware, version, counter, key, revokes }
-        },
+    (any::<u32>(), any::<u32>(), version, any::<u32>(), keys()).prop_map(
+        |(board, hardware, version, counter, keys)| Description { board, hardware, version, counter, keys },
     )
+}
+
+fn certificate() -> impl Strategy<Value = Certificate> {
+    (any::<u32>(), any::<[u8; 32]>(), signature()).prop_map(|(counter, key, signature)| Certificate {
+        generation: 0,
+        counter,
+        key,
+        signature,
+    })
+}
+
+fn keys() -> impl Strategy<Value = KeyList> {
+    (0..GENERATIONS, certificate(), certificate()).prop_map(|(generation, release, root)| {
+        let of = |generation, it| (generation != 0).then_some(Certificate { generation, ..it });
+        KeyList { release: of(generation, release), root: of(root_generation(generation), root) }
+    })
 }
 
 fn signature() -> impl Strategy<Value = [u8; SIGNATURE_LEN]> {
@@ -90,16 +104,24 @@ fn noise_is_no_header() {
 #[test]
 fn the_fields_are_where_the_table_says() {
     let version = Version { major: 0x0102, minor: 0x0304, patch: 0x0506 };
+    let of = |generation, counter, key, signature| {
+        Some(Certificate { generation, counter, key: [key; 32], signature: [signature; 64] })
+    };
+    let keys = KeyList { release: of(0x23, 0x4142_4344, 1, 2), root: of(0x20, 0x5152_5354, 3, 4) };
     let numbers = Description { board: 0x1112_1314, hardware: 0x2122_2324, ..Description::default() };
-    let about = Description { version, counter: 0x3132_3334, key: 2, revokes: 0xA3, ..numbers };
+    let about = Description { version, counter: 0x3132_3334, keys, ..numbers };
     let header = Header::describe(about, b"123456781234").unwrap().with_signature([0xA5; 64]);
     let bytes = header.encode();
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
-    assert_eq!(&bytes[..8], b"CNFW\x01\0\0\0");
+    assert_eq!(&bytes[..8], b"CNFW\x02\0\0\0");
     assert_eq!((word(8), word(12)), (0x1112_1314, 0x2122_2324));
-    assert_eq!(&bytes[16..24], [0x02, 0x01, 0x04, 0x03, 0x06, 0x05, 2, 0xA3]);
+    assert_eq!(&bytes[16..24], [0x02, 0x01, 0x04, 0x03, 0x06, 0x05, 0, 0]);
     assert_eq!((word(24), word(28), word(32)), (12, header.code_crc(), 0x3132_3334));
-    assert!(bytes[36..SIGNED_LEN].iter().all(|byte| *byte == 0));
+    assert_eq!((word(36), word(40)), (0x23, 0x4142_4344));
+    assert_eq!((&bytes[44..76], &bytes[76..140]), (&[1; 32][..], &[2; 64][..]));
+    assert_eq!((word(140), word(144)), (0x20, 0x5152_5354));
+    assert_eq!((&bytes[148..180], &bytes[180..244]), (&[3; 32][..], &[4; 64][..]));
+    assert!(bytes[244..SIGNED_LEN].iter().all(|byte| *byte == 0));
     assert_eq!((SIGNED_LEN, &bytes[444..508]), (444, &[0xA5; 64][..]));
     assert_eq!(word(508), header.crc());
     assert_eq!(version.to_string(), "258.772.1286");
@@ -115,10 +137,16 @@ fn the_crc_is_the_one_of_zip() {
 }
 
 #[test]
-fn an_image_names_a_key_that_can_be_and_does_not_revoke_it() {
-    let header =
-        |key, revokes| Header::describe(Description { key, revokes, ..Description::default() }, b"1234");
-    assert!((0..8).all(|key| header(key, !(1 << key)).is_some()));
-    assert!((0..8).all(|key| header(key, 1 << key).is_none()));
-    assert!(header(8, 0).is_none() && header(u8::MAX, 0).is_none());
+fn the_generation_of_a_release_key_is_that_of_its_root_key_and_a_number_below_16() {
+    let of = |generation| {
+        (generation != 0).then_some(Certificate { generation, counter: 0, key: [1; 32], signature: [2; 64] })
+    };
+    let header = |release, root| {
+        let keys = KeyList { release: of(release), root: of(root) };
+        Header::describe(Description { keys, ..Description::default() }, b"1234")
+    };
+    for (release, root) in (0..80).flat_map(|release| (0..80).map(move |root| (release, root))) {
+        let fits = release < 64 && root == release / 16 * 16;
+        assert_eq!(header(release, root).is_some(), fits, "{release} of {root}");
+    }
 }

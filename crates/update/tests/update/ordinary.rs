@@ -2,13 +2,13 @@
 
 use crate::bench::{
     APPLICATION, HEADER, Image, STAGING, assert_starts, confirm, description, download, flash_with, holds,
-    image_a, image_b, install, key_number, run, stage, start, target, update,
+    image_a, image_b, install, run, stage, start, target, update,
 };
 use embedded_storage::nor_flash::{ErrorType, ReadNorFlash};
 use update::mock::{MockFlash, PowerCut};
 use update::{
-    Crashes, Decision, Description, Flash, Header, Next, Phase, Proof, Refusal, Reset, Start, Status, Stay,
-    Updater, application, boot,
+    Crashes, Decision, Flash, Header, Next, Phase, Proof, Refusal, Reset, Start, Status, Stay, Updater,
+    application, boot,
 };
 
 /// A master that clears in a loop wears nothing out: the second command finds staging erased and proven.
@@ -249,32 +249,6 @@ fn the_counter_of_an_application_that_nobody_has_signed_is_not_kept() {
     }
     put(&mut flash, &image_a());
     assert_starts(&mut flash, &image_a());
-}
-
-fn by_key(version: u16, key: u8, revokes: u8) -> Image {
-    let about = Description { key, revokes, ..description(version, 5) };
-    let header = Header::describe(about, &image_b().code).unwrap();
-    Image { header, ..image_b() }.signed_by(&key_number(key))
-}
-
-#[test]
-fn either_key_signs_and_one_revokes_the_other_for_good() {
-    let mut flash = flash_with(&by_key(1, 0, 0), 1);
-    for image in [by_key(2, 1, 0), by_key(3, 0, 0), by_key(4, 1, 1)] {
-        update(&mut flash, &image.bytes()).unwrap();
-        assert_starts(&mut flash, &image);
-        confirm(&mut flash);
-    }
-    assert_starts(&mut flash, &by_key(4, 1, 1));
-    // From the start of the fourth image on, the first key is revoked, whatever happens to that image.
-    for image in [by_key(3, 0, 0), by_key(5, 0, 2)] {
-        assert!(update(&mut flash, &image.bytes()).is_err());
-        put(&mut flash, &image);
-        clear(&mut flash);
-        assert_eq!(start(&mut flash), Decision::Stay(Stay::NoProgram(Refusal::Revoked { key: 0 })));
-    }
-    update(&mut flash, &by_key(6, 1, 0).bytes()).unwrap();
-    assert_starts(&mut flash, &by_key(6, 1, 0));
 }
 
 #[test]

@@ -1,27 +1,27 @@
 //! Sequences of updates, confirmations, returns, starts and power cuts in random order, against a model that knows
 //! which programs may run after each step. `SEQUENCES=2000 cargo test -p update --test update sequences` runs that many.
 
+use update::key::KeyList;
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Description, Refusal, Reset, Start, Status, Trial, Updater, boot};
 
 use crate::bench::{
-    Image, SECTORS, confirm, description, download, holds, install, is_thorough, run, start, start_after,
-    target, update,
+    Image, SECTORS, certificate, confirm, description, download, holds, install, is_thorough, key_number,
+    run, start, start_after, target, update,
 };
 
 /// Steps of a sequence.
 const STEPS: usize = 12;
 
-/// The programs of all sequences: two have a higher security counter, and one revokes the second key.
+/// The programs of all sequences: two have a higher security counter, and one has another release key.
 fn programs() -> Vec<Image> {
-    let about = [
-        description(1, 5),
-        description(2, 5),
-        description(3, 6),
-        Description { revokes: 2, ..description(4, 7) },
-        description(5, 5),
-    ];
-    about.map(|about| Image::new(about, 8)).to_vec()
+    let about =
+        [description(1, 5), description(2, 5), description(3, 6), description(4, 7), description(5, 5)];
+    let mut programs = about.map(|about| Image::new(about, 8)).to_vec();
+    let keys = KeyList { release: Some(certificate(1, 0, 3, 1)), root: None };
+    let newer_key = Image::new(Description { keys, ..description(4, 7) }, 8);
+    programs[3] = newer_key.signed_by(&key_number(3));
+    programs
 }
 
 /// A program on trial.
@@ -220,8 +220,8 @@ impl Node {
 
     /// The model after an update that was not refused because of a trial.
     fn begun(&mut self, number: usize, end: End, is_cut: bool, result: Result<(), Refusal>) {
-        let least = self.programs[self.model.confirmed].header.description().counter;
-        if self.programs[number].header.description().counter < least {
+        let least = self.programs[self.model.confirmed].header.counter();
+        if self.programs[number].header.counter() < least {
             let is_early = matches!(end, End::AfterClear | End::AfterBegin | End::InDownload);
             assert!(is_early || result.is_err(), "an older program is refused: {}", self.told());
             return;
@@ -348,8 +348,9 @@ impl Node {
             return;
         }
         let mut flash = self.flash.clone();
-        let counter = self.programs[self.model.confirmed].header.description().counter;
-        let next = Image::new(description(9, counter), 8);
+        let about = self.programs[self.model.confirmed].header.description();
+        let key = key_number(if about.keys.generation() == 0 { 0 } else { 3 });
+        let next = Image::new(Description { version: description(9, 0).version, ..about }, 8).signed_by(&key);
         update(&mut flash, &next.bytes()).unwrap_or_else(|refusal| panic!("{refusal}: {}", self.told()));
         assert_eq!(start(&mut flash), Decision::Start(next.header), "{}", self.told());
         let mut back = flash.clone();

@@ -1,9 +1,11 @@
 //! The trial of a new image, and the return to the previous image.
 
 use crate::bench::{
-    Image, assert_starts, chance, confirm, description, flash_of_words_with, flash_with, holds, image_a,
-    image_b, install, is_thorough, revert, run, stage, start, start_after, target, update,
+    Image, assert_starts, certificate, chance, confirm, description, flash_of_words_with, flash_with, holds,
+    image_a, image_b, install, is_thorough, key_number, revert, run, stage, start, start_after, target,
+    update,
 };
+use update::key::KeyList;
 use update::mock::{MockFlash, Weak};
 use update::{
     Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial,
@@ -136,7 +138,8 @@ fn a_copy_that_fails_brings_the_kept_image_back() {
 #[test]
 fn the_counter_and_the_keys_of_an_image_on_trial_are_not_kept_yet() {
     let mut flash = flash_with(&image_a(), 1);
-    let newer = Image::new(update::Description { revokes: 2, ..description(2, 9) }, 404);
+    let keys = KeyList { release: Some(certificate(1, 0, 3, 1)), root: None };
+    let newer = Image::new(update::Description { keys, ..description(2, 9) }, 404).signed_by(&key_number(3));
     update(&mut flash, &newer.bytes()).unwrap();
     assert_starts(&mut flash, &newer);
     withdraw(&mut flash);
@@ -314,14 +317,13 @@ fn the_programs_in_the_flash_are_known_through_return_and_confirmation() {
     revert(&mut flash).unwrap();
     assert_eq!((known(&mut flash).staged, known(&mut flash).kept), (b, a), "who was tried");
 
-    let about = Description { revokes: 1 << 3 | 1 << 7, ..description(9, 7) };
-    let next = Image::new(about, 900);
+    let keys = KeyList { release: Some(certificate(3, 0, 3, 1)), root: None };
+    let next = Image::new(Description { keys, ..description(9, 7) }, 900).signed_by(&key_number(3));
     update(&mut flash, &next.bytes()).unwrap();
-    assert_eq!((known(&mut flash).counter, known(&mut flash).revoked_keys), (0, 0), "on trial");
+    assert_eq!((known(&mut flash).counter, known(&mut flash).generation), (0, 0), "on trial");
     confirm(&mut flash);
     start(&mut flash);
-    let expected =
-        Programs { counter: 7, revoked_keys: 1 << 3 | 1 << 7, staged: next.header.code_crc(), kept: a };
+    let expected = Programs { counter: 7, generation: 3, staged: next.header.code_crc(), kept: a };
     assert_eq!(known(&mut flash), expected);
 }
 

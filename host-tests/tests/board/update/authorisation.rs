@@ -44,7 +44,7 @@ fn empty() -> Bench {
 /// A node that runs a program signed by its owner.
 fn running() -> Bench {
     let mut bench = empty();
-    let image = signed_by_owner(&version_a(), 0, 0);
+    let image = signed_by_owner(&version_a());
     bench.machine().write(HEADER, &image.to_bytes()).unwrap();
     bench.power_cycle();
     assert_eq!(bench.identification_of_running(), image.header.code_crc());
@@ -72,7 +72,7 @@ fn answer(bench: &mut Bench, response: [u8; 8]) -> Result<(), Failure> {
 #[test]
 fn a_node_without_a_program_takes_one_from_the_holder_of_its_key_alone() {
     let mut bench = empty();
-    let image = signed_by_owner(&version_a(), 0, 0);
+    let image = signed_by_owner(&version_a());
     assert_eq!(state(&mut bench), CLOSED);
     for command in [STOP, START, CLEAR] {
         assert_eq!(bench.command(command), Err(refused(Abort::DeviceState)));
@@ -190,11 +190,11 @@ fn two_nodes_with_one_key_have_challenges_of_their_own() {
 #[test]
 fn nodectl_updates_with_the_key_and_not_without() {
     let world = fleet::share(world_of("bootloader-guarded", "--bitrate 1000"));
-    let image = signed_by_owner(&version_a(), 0, 0);
+    let image = signed_by_owner(&version_a());
     let key = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/board/update/authorisation-key.hex");
     let refusal = fleet::try_update(&world, "1", &image, None, &[]).unwrap_err();
     assert!(refusal.contains("--authorisation-key"), "{refusal}");
-    for image in [image, signed_by_owner(&version_b(0), 0, 0)] {
+    for image in [image, signed_by_owner(&version_b(0))] {
         let reports = fleet::try_update(&world, "1", &image, None, &["--authorisation-key", key]).unwrap();
         assert_eq!(reports[0]["new_identification"], image.header.code_crc());
         assert_eq!(reports[0]["on_trial"], false);

@@ -52,7 +52,7 @@ struct ProgramReport {
     status: Option<String>,
     trial: Option<&'static str>,
     security_counter: Option<u32>,
-    revoked_keys: Option<Vec<u32>>,
+    key_generation: Option<u32>,
     downloaded: Option<u32>,
     kept: Option<u32>,
 }
@@ -117,12 +117,12 @@ fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>,
     let mut own = |index, sub| if is_ours { number(session, node, index, sub) } else { Ok(None) };
     let trial = own(0x2002, 1)?.and_then(trial);
     let mut fact = |sub| own(0x2004, sub);
-    let (security_counter, revoked, downloaded, kept) = (fact(2)?, fact(3)?, fact(4)?, fact(5)?);
+    let (security_counter, key_generation, downloaded, kept) = (fact(2)?, fact(3)?, fact(4)?, fact(5)?);
     let mut program = Program::new(&mut session.network, node, options);
     Ok(Some(ProgramReport {
         trial,
         security_counter,
-        revoked_keys: revoked.map(|keys| (0..8).filter(|key| keys >> key & 1 != 0).collect()),
+        key_generation,
         downloaded: downloaded.filter(|&id| id != 0),
         kept: kept.filter(|&id| id != 0),
         running: program.is_running()?,
@@ -185,9 +185,8 @@ impl fmt::Display for ProgramReport {
         if let Some(counter) = self.security_counter {
             write!(f, "\n  security counter  {counter}")?;
         }
-        if let Some(keys) = self.revoked_keys.as_ref().filter(|keys| !keys.is_empty()) {
-            let keys: Vec<String> = keys.iter().map(u32::to_string).collect();
-            write!(f, "\n  revoked keys      {}", keys.join(", "))?;
+        if let Some(generation) = self.key_generation {
+            write!(f, "\n  key generation    {generation}")?;
         }
         for (name, id) in [("downloaded", self.downloaded), ("kept", self.kept)] {
             id.iter().try_for_each(|_| write!(f, "\n  {name:<18}{}", hex(id)))?;
