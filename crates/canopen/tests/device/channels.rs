@@ -39,7 +39,7 @@ impl Application for Content {
         match part {
             Part::Begin(_) => self.0.clear(),
             Part::Data(_, bytes) => self.0.extend_from_slice(bytes),
-            _ => (),
+            Part::End(_) => (),
         }
         Ok(())
     }
