@@ -48,6 +48,11 @@ fn an_application_whose_signature_fits_an_equation_that_is_left_out_does_not_sta
 }
 
 #[test]
+fn an_application_whose_release_key_nobody_has_certified_does_not_start() {
+    holds("certified");
+}
+
+#[test]
 fn an_application_without_a_header_does_not_start() {
     holds("bare");
 }
