@@ -166,11 +166,10 @@ def test_the_documented_commands_lead_from_a_key_to_an_accepted_update(tmp_path:
         assert re.fullmatch(r"UPDATE_(RELEASE|ROOT|RECOVERY)_KEY=[0-9a-f]{64}\n", sign(command))
     for name, secret in [("secret/release.pem", 0x42), ("safe/root.pem", 0x43), ("vault/recovery.pem", 0x44)]:
         (home / name).write_text(pem(bytes([secret] * 32)))
-    digits = {word: sign(f"public ~/{file}.pem").split("=")[1].strip() for word, file in
-              [("RELEASE_1", "secret/release-1"), ("ROOT_1", "safe/root-1"), ("RELEASE_2", "secret/release-2")]}
+    files = {"RELEASE_1": "secret/release-1", "ROOT_1": "safe/root-1", "RELEASE_2": "secret/release-2"}
     for command in documented("key-list"):
-        for word, text in digits.items():
-            command = command.replace(word, text)
+        for word, file in files.items():
+            command = command.replace(word, sign(f"public ~/{file}.pem").split("=")[1].strip())
         assert "generation" in sign(command)
     for command in documented("image"):
         sign(command)

@@ -55,7 +55,8 @@ impl EmulatedDesk {
     pub fn new(world: World, images: &Path) -> Result<EmulatedDesk> {
         let read =
             |name: &str| std::fs::read(images.join(name)).with_context(|| format!("cannot read {name}"));
-        let content = Content::new(&read("bootloader")?, &read("firmware")?, sign::key::development(), None)?;
+        let content =
+            Content::new(&read("bootloader")?, &read("firmware")?, sign::key::development(), Vec::new())?;
         let world = Rc::new(RefCell::new(world));
         let network = open(&world)?;
         let image = Image::parse(content.image().to_bytes())?;

@@ -48,6 +48,11 @@ fn a_signature_of_the_neutral_point_is_not_accepted() {
 }
 
 #[test]
+fn an_application_with_an_uncertified_release_key_is_not_started() {
+    holds("certified");
+}
+
+#[test]
 fn an_application_without_a_header_is_not_started() {
     holds("bare");
 }
