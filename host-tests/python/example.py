@@ -28,6 +28,7 @@ class Program:
         line = [command(name), f"127.0.0.1:{port}", "vcan0", str(node), *arguments]
         self.process = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.lines: queue.Queue[str] = queue.Queue()
+        self.waiting: list[str] = []
         threading.Thread(target=lambda: [self.lines.put(line) for line in self.process.stdout], daemon=True).start()
 
     def command(self, *words) -> None:
@@ -38,8 +39,10 @@ class Program:
         return self.lines.get(timeout=PATIENCE).strip()
 
     def wait_for(self, line: str) -> None:
-        while self.line() != line:
-            pass
+        """Waits for a line. The lines before it are kept for other calls."""
+        while line not in self.waiting:
+            self.waiting.append(self.line())
+        self.waiting.remove(line)
 
     def end(self) -> None:
         self.process.kill()

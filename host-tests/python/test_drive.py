@@ -189,5 +189,7 @@ def test_a_master_that_falls_silent_is_a_fault_of_a_drive_with_torque(bench):
     bench.node.sdo[0x1016][1].raw = 0x7F << 16 | 200
     bench.enable()
     bench.network.send_message(0x77F, b"\x05")
-    bench.wait_for(FAULT)
+    # 1029h:1 has its default: the node is Pre-operational, without PDOs.
+    while bench.status() != FAULT:
+        pass
     assert bench.node.sdo[0x603F].raw == 0x8100

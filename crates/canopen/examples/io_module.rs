@@ -180,7 +180,7 @@ impl Application for Io {
 
 /// The device, and the files of its parameters.
 struct Module {
-    file: Option<PathBuf>,
+    file: Option<String>,
 }
 
 /// Room for the values of either group.
@@ -189,7 +189,7 @@ const ROOM: usize = packed_size(ROWS, Group::Communication) + packed_size(ROWS, 
 impl Module {
     /// The file of a group.
     fn file(&self, group: Group) -> Option<PathBuf> {
-        self.file.as_ref().map(|file| file.with_added_extension(group.sub().to_string()))
+        self.file.as_ref().map(|file| format!("{file}.{}", group.sub()).into())
     }
 
     /// Reads the files.
@@ -209,7 +209,7 @@ impl Module {
         let len = DICTIONARY.pack(group, device.node_id(), device.image(), &mut packed);
         packed.truncate(len.map_err(|_| Abort::OutOfMemory)?);
         // A power cut leaves the file before or the new one.
-        let new = file.with_added_extension("new");
+        let new = file.with_extension("new");
         fs::write(&new, &packed).and_then(|()| fs::rename(new, file)).map_err(|_| Abort::Hardware)?;
         device.application_mut().packed[group as usize] = packed;
         Ok(())
@@ -262,7 +262,7 @@ fn main() -> io::Result<()> {
     let (address, bus, node, file) = match arguments[..] {
         ["--eds", file] => {
             let mut sheet = String::new();
-            let device = DeviceInfo { vendor: "none", product: "I/O module" };
+            let device = DeviceInfo::new("none", "I/O module");
             canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
             return fs::write(file, sheet);
         }

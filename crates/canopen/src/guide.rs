@@ -6,6 +6,8 @@
 //! 4. [Answer LSS](answer_lss)
 //! 5. [Write an EDS](write_an_eds)
 //! 6. [Be a client](be_a_client)
+//! 7. [Drive a motor](drive_a_motor)
+//! 8. [Build a gateway](build_a_gateway)
 
 #[doc = include_str!("../docs/add-an-object.md")]
 pub mod add_an_object {}
@@ -24,3 +26,9 @@ pub mod write_an_eds {}
 
 #[doc = include_str!("../docs/be-a-client.md")]
 pub mod be_a_client {}
+
+#[doc = include_str!("../docs/drive-a-motor.md")]
+pub mod drive_a_motor {}
+
+#[doc = include_str!("../docs/build-a-gateway.md")]
+pub mod build_a_gateway {}

@@ -59,7 +59,7 @@ pub(super) fn checks_for_target() -> Vec<Step> {
         Step::new("no panic", no_panic),
         Step::new("lint images", lint_images),
         Step::new("other chips", check_other_chip),
-        Step::new("embassy", embassy),
+        Step::new("examples for the target", examples_for_target),
     ]
 }
 
@@ -96,13 +96,16 @@ fn check_other_chip() -> Result<()> {
     images::check_for(&Toolchain::ensure()?, chip)
 }
 
-/// Builds the library in an async main for the target. The program is never run.
-fn embassy() -> Result<()> {
-    let example = ["--release", "-p", "canopen-device", "--example", "embassy"];
-    let scripts = root().join("crates/canopen/examples/embassy");
-    let mut command = Toolchain::ensure()?.cargo("rustc", &example);
-    command.args(["--", "-Clink-arg=-Tlink.x"]).arg(format!("-Clink-arg=-L{}", scripts.display()));
-    progress::build("embassy", &mut command)
+/// Builds the examples for the target: the library in an async main, and in RTIC for a NUCLEO. They are never run.
+fn examples_for_target() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    ["embassy", "rtic"].into_iter().try_for_each(|name| {
+        let example = ["--release", "-p", "canopen-device", "--example", name];
+        let scripts = root().join("crates/canopen/examples").join(name);
+        let mut command = toolchain.cargo("rustc", &example);
+        command.args(["--", "-Clink-arg=-Tlink.x"]).arg(format!("-Clink-arg=-L{}", scripts.display()));
+        progress::build(name, &mut command)
+    })
 }
 
 /// Links all code that handles data from the bus with a panic handler that cannot be linked. Also checks that code with

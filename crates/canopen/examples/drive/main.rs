@@ -72,8 +72,9 @@ struct Drive {
 }
 
 impl Drive {
-    /// Takes a controlword.
-    fn control(&mut self, controlword: u16, image: &mut [u8]) {
+    /// Carries out the controlword.
+    fn control(&mut self, image: &mut [u8]) {
+        let controlword = at::CONTROLWORD.u16(image);
         let rising = controlword & !self.controlword;
         self.controlword = controlword;
         let before = self.state;
@@ -178,11 +179,10 @@ impl Application for Drive {
         self.show(image);
     }
 
-    /// 6040h and 6060h are handled, by SDO and by RPDO alike.
-    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// Decides on 6040h and 6060h, by SDO and by RPDO alike.
+    fn write(&mut self, entry: &Entry, bytes: &[u8], _image: &mut [u8]) -> Result<(), Abort> {
         match (entry.index(), bytes) {
             (0x6040, _) if self.is_local => return Err(Abort::LocalControl),
-            (0x6040, &[low, high]) => self.control(u16::from_le_bytes([low, high]), image),
             (0x6060, &[mode]) => {
                 let mode = mode.cast_signed();
                 if !matches!(mode, PROFILE_POSITION | PROFILE_VELOCITY) {
@@ -196,6 +196,17 @@ impl Application for Drive {
             _ => (),
         }
         Ok(())
+    }
+
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        if entry.index() == 0x6040 {
+            self.control(image);
+        }
+    }
+
+    /// All values of the RPDO are in the image: the controlword applies to the target beside it.
+    fn received(&mut self, _rpdo: u16, image: &mut [u8]) {
+        self.control(image);
     }
 
     /// The connection to the master is lost: 6007h decides.
@@ -250,7 +261,7 @@ fn main() -> io::Result<()> {
     match arguments[..] {
         ["--eds", file] => {
             let mut sheet = String::new();
-            let device = DeviceInfo { vendor: "none", product: "Drive" };
+            let device = DeviceInfo::new("none", "Drive");
             canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
             std::fs::write(file, sheet)
         }

@@ -84,6 +84,7 @@ pub(crate) mod at {
 
     pub(crate) const ABORT_CONNECTION: Field = DICTIONARY.field(0x6007, 0);
     pub(crate) const ERROR_CODE: Field = DICTIONARY.field(0x603F, 0);
+    pub(crate) const CONTROLWORD: Field = DICTIONARY.field(0x6040, 0);
     pub(crate) const STATUSWORD: Field = DICTIONARY.field(0x6041, 0);
     pub(crate) const QUICK_STOP_OPTION: Field = DICTIONARY.field(0x605A, 0);
     pub(crate) const MODE: Field = DICTIONARY.field(0x6060, 0);

@@ -218,7 +218,9 @@ impl<D: Definition> Inner<D> {
             self.load_stored(Group::Application);
             self.load_stored(Group::Calibration);
             if Self::has(Services::OWN_GROUPS) {
-                Group::OWN.into_iter().for_each(|group| self.load_stored(group));
+                for group in Group::OWN {
+                    self.load_stored(group);
+                }
             }
         }
     }

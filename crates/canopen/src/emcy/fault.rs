@@ -71,6 +71,7 @@ impl Condition {
 
 /// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ErrorClass(pub u8);
 
 impl ErrorClass {
