@@ -22,6 +22,9 @@ pub(crate) struct Options {
     /// Fail when a number of ours is more than a few per cent worse than docs/performance.md states
     #[arg(long, conflicts_with = "write")]
     check: bool,
+    /// Measure the sizes for a Cortex-M0+ too (thumbv6m-none-eabi); `--write` does so in any case
+    #[arg(long)]
+    small: bool,
     /// Instead of the tables, say where the instructions of the operations are whose name contains this
     #[arg(long, value_name = "OPERATION")]
     profile: Option<String>,
@@ -55,6 +58,9 @@ pub(crate) fn measure(options: &Options, tools: Tools) -> Result<()> {
     if let Some(operation) = &options.profile {
         command.arg("--profile").arg(operation);
     }
+    if options.small || options.write {
+        command.arg("--small").arg(build_small(options)?);
+    }
     if options.by_module {
         command.arg("--by-module");
     }
@@ -64,6 +70,24 @@ pub(crate) fn measure(options: &Options, tools: Tools) -> Result<()> {
 /// The step of the test command: fails when the flashed code has become worse than docs/performance.md states.
 pub(crate) fn check() -> Result<()> {
     measure(&Options { check: true, ..Options::default() }, Tools::Built)
+}
+
+/// The target of the smallest microcontrollers.
+const SMALL: &str = "thumbv6m-none-eabi";
+
+/// Builds our programs for a Cortex-M0+. Returns their directory.
+fn build_small(options: &Options) -> Result<PathBuf> {
+    let profile = options.cargo_profile();
+    let mut arguments = vec!["--profile", profile, "-p", "bench-images"];
+    for image in ["empty", "minimal", "set", "services", "ours"] {
+        arguments.extend(["--bin", image]);
+    }
+    let mut command = Toolchain::ensure()?.cargo_for(SMALL, "build", &arguments);
+    // The core has no compare-and-swap; a dependency of another node asks for it.
+    command
+        .env("CARGO_TARGET_THUMBV6M_NONE_EABI_RUSTFLAGS", "--cfg portable_atomic_unsafe_assume_single_core");
+    progress::build("bench images for a Cortex-M0+", &mut command)?;
+    Ok(target_dir().join(SMALL).join(profile))
 }
 
 /// Builds the measured programs. Returns their directory.

@@ -54,12 +54,19 @@ impl Toolchain {
     /// The images do not depend on build settings of the environment. Incremental code is 2 % longer, which is more
     /// than the flash has left, and flags of the environment would replace those of `.cargo/config.toml`.
     pub(crate) fn cargo(&self, verb: &str, args: &[&str]) -> Command {
+        let mut command = self.cargo_for(TRIPLE, verb, args);
+        command.args(["--config", STACK_SIZES]);
+        command
+    }
+
+    /// As [`cargo`](Toolchain::cargo), for another target of the same linker.
+    pub(crate) fn cargo_for(&self, triple: &str, verb: &str, args: &[&str]) -> Command {
         let mut command = match self {
             Toolchain::Installed => cargo(),
             Toolchain::Debian { .. } => Command::new("/usr/bin/cargo"),
         };
-        command.current_dir(root()).arg(verb).args(["--target", TRIPLE]).args(args);
-        command.args(["--config", STACK_SIZES]).env("RUSTC_BOOTSTRAP", "1").env("CARGO_INCREMENTAL", "0");
+        command.current_dir(root()).arg(verb).args(["--target", triple]).args(args);
+        command.env("RUSTC_BOOTSTRAP", "1").env("CARGO_INCREMENTAL", "0");
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
         if let Toolchain::Debian { linker } = self {
             command
@@ -67,12 +74,17 @@ impl Toolchain {
                 .env("RUSTC", "/usr/bin/rustc")
                 .env("RUSTDOC", "/usr/bin/rustdoc")
                 .env("PATH", debian_first())
-                .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
+                .env(linker_variable(triple), linker)
                 .env_remove("RUSTUP_TOOLCHAIN")
                 .env_remove("CARGO");
         }
         command
     }
+}
+
+/// The variable with which cargo takes a linker for a target.
+fn linker_variable(triple: &str) -> String {
+    format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase().replace('-', "_"))
 }
 
 /// Debian's cargo must find Debian's clippy-driver before rustup's proxies.

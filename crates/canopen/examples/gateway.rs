@@ -240,7 +240,7 @@ fn main() -> io::Result<()> {
     match arguments[..] {
         ["--eds", file] => {
             let mut sheet = String::new();
-            let device = DeviceInfo { vendor: "none", product: "Gateway" };
+            let device = DeviceInfo::new("none", "Gateway");
             canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
             std::fs::write(file, sheet)
         }

@@ -262,7 +262,7 @@ fn main() -> io::Result<()> {
     let (address, bus, node, file) = match arguments[..] {
         ["--eds", file] => {
             let mut sheet = String::new();
-            let device = DeviceInfo { vendor: "none", product: "I/O module" };
+            let device = DeviceInfo::new("none", "I/O module");
             canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
             return fs::write(file, sheet);
         }

@@ -8,7 +8,7 @@
 //!     canopen::rows!([objects::device_type(401), objects::error_register()], objects::identity(7, 1, 1));
 //!
 //! let mut sheet = String::new();
-//! canopen::eds::write(ROWS, &DeviceInfo { vendor: "Example", product: "I/O module" }, &mut sheet)?;
+//! canopen::eds::write(ROWS, &DeviceInfo::new("Example", "I/O module"), &mut sheet)?;
 //! assert!(sheet.contains("[1000]\n") && sheet.contains("ProductName=I/O module\n"));
 //! # Ok::<(), core::fmt::Error>(())
 //! ```
@@ -19,11 +19,38 @@ use crate::dictionary::{Access, DefaultValue, Mapping, Object, Type};
 
 /// Entries of the data sheet that do not follow from the rows.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct DeviceInfo<'a> {
     /// Name of the vendor.
     pub vendor: &'a str,
     /// Name of the product.
     pub product: &'a str,
+    /// Name of the file.
+    pub file_name: &'a str,
+    /// Revision of the file.
+    pub file_revision: u8,
+    /// Day and time of the edition, such as `11-25-2026` and `12:00AM`; `None` for a data sheet without a date.
+    pub date: Option<(&'a str, &'a str)>,
+    /// The bit rates of the device in kbit/s.
+    pub bit_rates: &'a [u16],
+    /// Whether the device has an LSS slave ([`Application::LSS`](crate::Application::LSS)).
+    pub has_lss: bool,
+}
+
+impl<'a> DeviceInfo<'a> {
+    /// A device with all bit rates and with LSS, and a file `device.eds` without a date.
+    #[must_use]
+    pub const fn new(vendor: &'a str, product: &'a str) -> DeviceInfo<'a> {
+        DeviceInfo {
+            vendor,
+            product,
+            file_name: "device.eds",
+            file_revision: 0,
+            date: None,
+            bit_rates: &BIT_RATES,
+            has_lss: true,
+        }
+    }
 }
 
 /// Bit rates of CiA 301 in kbit/s.
@@ -47,13 +74,18 @@ fn info(rows: &[Object], device: &DeviceInfo<'_>, out: &mut impl Write) -> Resul
         })
     };
     let count = |first: u16| rows.iter().filter(|row| row.sub == 0 && row.index & 0xFE00 == first).count();
-    writeln!(out, "[FileInfo]\nFileName=device.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0")?;
-    writeln!(out, "Description={}\nCreatedBy={}\n", device.product, device.vendor)?;
+    writeln!(out, "[FileInfo]\nFileName={}\nFileVersion=1", device.file_name)?;
+    writeln!(out, "FileRevision={}\nEDSVersion=4.0\nDescription={}", device.file_revision, device.product)?;
+    if let Some((day, time)) = device.date {
+        writeln!(out, "CreationDate={day}\nCreationTime={time}")?;
+        writeln!(out, "ModificationDate={day}\nModificationTime={time}\nModifiedBy={}", device.vendor)?;
+    }
+    writeln!(out, "CreatedBy={}\n", device.vendor)?;
     writeln!(out, "[DeviceInfo]\nVendorName={}\nVendorNumber=0x{:08X}", device.vendor, number(0x1018, 1))?;
     writeln!(out, "ProductName={}\nProductNumber=0x{:08X}", device.product, number(0x1018, 2))?;
     writeln!(out, "RevisionNumber=0x{:08X}\nOrderCode={}", number(0x1018, 3), device.product)?;
     for rate in BIT_RATES {
-        writeln!(out, "BaudRate_{rate}=1")?;
+        writeln!(out, "BaudRate_{rate}={}", u8::from(device.bit_rates.contains(&rate)))?;
     }
     writeln!(out, "SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\nDynamicChannelsSupported=0")?;
     writeln!(
@@ -62,7 +94,7 @@ fn info(rows: &[Object], device: &DeviceInfo<'_>, out: &mut impl Write) -> Resul
         count(0x1400),
         count(0x1800)
     )?;
-    writeln!(out, "LSS_Supported=1\n\n[DummyUsage]")?;
+    writeln!(out, "LSS_Supported={}\n\n[DummyUsage]", u8::from(device.has_lss))?;
     (1..=7).try_for_each(|kind| writeln!(out, "Dummy{kind:04X}={}", u8::from(kind > 1)))?;
     writeln!(out, "\n[Comments]\nLines=0\n")
 }

@@ -22,7 +22,7 @@ const ROWS: &[Object] = canopen::rows!(
 /// The lines of a section.
 fn section(name: &str) -> Vec<String> {
     let mut sheet = String::new();
-    write(ROWS, &DeviceInfo { vendor: "Example", product: "I/O module" }, &mut sheet).unwrap();
+    write(ROWS, &DeviceInfo::new("Example", "I/O module"), &mut sheet).unwrap();
     let mut lines = sheet.lines().skip_while(|line| *line != format!("[{name}]")).skip(1);
     lines.by_ref().take_while(|line| !line.is_empty()).map(str::to_owned).collect()
 }
@@ -67,4 +67,28 @@ fn an_entry_has_type_default_limits_and_mapping() {
         assert!(entry.iter().any(|own| own == line), "{line}: {entry:?}");
     }
     assert!(section("6000sub1").iter().any(|line| line == "PDOMapping=1"));
+}
+
+#[test]
+fn what_does_not_follow_from_the_rows_is_the_vendors() {
+    let mut info = DeviceInfo::new("Example", "I/O module");
+    (info.file_name, info.file_revision, info.date) = ("io.eds", 3, Some(("11-25-2026", "12:00AM")));
+    (info.bit_rates, info.has_lss) = (&[125, 250], false);
+    let mut sheet = String::new();
+    write(ROWS, &info, &mut sheet).unwrap();
+    for line in [
+        "FileName=io.eds",
+        "FileRevision=3",
+        "CreationDate=11-25-2026",
+        "ModificationTime=12:00AM",
+        "BaudRate_125=1",
+        "BaudRate_250=1",
+        "BaudRate_500=0",
+        "BaudRate_1000=0",
+        "LSS_Supported=0",
+    ] {
+        assert!(sheet.lines().any(|own| own == line), "{line}: {sheet}");
+    }
+    assert!(!section("FileInfo").iter().any(|line| line.contains("Date")), "no date, no entry");
+    assert!(section("DeviceInfo").contains(&"BaudRate_1000=1".to_owned()));
 }

@@ -34,6 +34,9 @@ struct Cli {
     /// Where the ELF files of bench-images are
     #[arg(long)]
     images: PathBuf,
+    /// Where the ELF files of our devices for a Cortex-M0+ are
+    #[arg(long)]
+    small: Option<PathBuf>,
     /// The images are optimised for speed: compare with what CANopenNode does with -O2
     #[arg(long)]
     speed: bool,
@@ -69,7 +72,7 @@ fn run(cli: &Cli) -> Result<()> {
         return modules::print(&cli.images);
     }
     let optimisation = if cli.speed { Optimisation::Speed } else { Optimisation::Size };
-    let report = Report::measure(&cli.images, optimisation)?;
+    let report = Report::measure(&cli.images, cli.small.as_deref(), optimisation)?;
     println!("{report}");
     match (&cli.write, &cli.check) {
         (Some(path), _) => page::write(path, &report),

@@ -90,7 +90,7 @@ fn device(row: &Pdo) -> (&'static Dictionary, Node) {
     rows.sort_by_key(Object::key);
     let rows: [Object; ROWS] = rows.try_into().unwrap();
     let tables: &'static Tables<1, ROWS, ROWS, ROWS, SIZE> =
-        Box::leak(Box::new(dictionary::compile(&[&rows])));
+        Box::leak(Box::new(dictionary::compile(&dictionary::TableBuilder::of(&[&rows]))));
     let [dictionary] = tables.dictionaries();
     let dictionary: &'static Dictionary = Box::leak(Box::new(dictionary));
     (dictionary, Device::new(dictionary, NodeId::new(ID), ()))

@@ -261,7 +261,7 @@ fn main() -> io::Result<()> {
     match arguments[..] {
         ["--eds", file] => {
             let mut sheet = String::new();
-            let device = DeviceInfo { vendor: "none", product: "Drive" };
+            let device = DeviceInfo::new("none", "Drive");
             canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
             std::fs::write(file, sheet)
         }

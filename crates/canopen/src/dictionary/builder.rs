@@ -33,15 +33,25 @@ const MAX_ATTRIBUTES: usize = 256;
 #[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
 #[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
 impl TableBuilder {
-    /// The tables of these tables of rows.
+    /// As [`of`](TableBuilder::of), with a check of all tables.
     ///
     /// # Panics
     /// During compilation, when a table is wrong: see [`check`].
     #[must_use]
+    pub const fn checked(all: &[&[Object]]) -> TableBuilder {
+        let mut i = 0;
+        while i < all.len() {
+            check(all[i]);
+            i += 1;
+        }
+        TableBuilder::of(all)
+    }
+
+    /// The tables of these tables of rows, which must be right.
+    #[must_use]
     pub const fn of(all: &[&[Object]]) -> TableBuilder {
         let (mut builder, mut i) = (TableBuilder::new(&all[0][0]), 0);
         while i < all.len() {
-            check(all[i]);
             builder.add(all[i]);
             builder.ends[i] = builder.used.series as u16;
             i += 1;

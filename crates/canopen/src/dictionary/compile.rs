@@ -64,7 +64,7 @@ macro_rules! dictionaries {
         // The expression `$all` must not use any of these names.
         const ROWS_OF_ALL: &[&[make::Object]] = &$all;
         #[allow(long_running_const_eval)]
-        const BUILT: make::TableBuilder = make::TableBuilder::of(ROWS_OF_ALL);
+        const BUILT: make::TableBuilder = make::TableBuilder::checked(ROWS_OF_ALL);
         static COMPILED_TABLES: make::Tables<
             { ROWS_OF_ALL.len() },
             { BUILT.counts().series },

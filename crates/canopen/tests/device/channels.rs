@@ -326,3 +326,30 @@ fn the_application_reads_another_node_by_its_client_object() {
     }
     assert_eq!(upload.into_sink().as_slice(), TEXT.as_bytes());
 }
+
+/// A queue without room.
+struct Full;
+
+impl canopen::Transmit for Full {
+    fn send(&mut self, _: Frame) -> Result<(), canopen::QueueFull> {
+        Err(canopen::QueueFull)
+    }
+
+    fn room(&self) -> usize {
+        0
+    }
+}
+
+/// A node sends nothing before its boot-up message.
+#[test]
+fn a_client_waits_for_the_boot_up_message() {
+    let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Content::default());
+    let _ = node.start(Instant(0), &mut Full);
+    node.show(|_, image| {
+        DICTIONARY.field(0x1280, 1).set_u32(image, 0x609);
+        DICTIONARY.field(0x1280, 2).set_u32(image, 0x589);
+    });
+    assert_eq!(node.sdo_client(1), None);
+    let _ = node.poll(Instant(2000), &mut Sent::default());
+    assert!(node.sdo_client(1).is_some());
+}

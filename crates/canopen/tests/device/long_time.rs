@@ -1,1 +1,101 @@
-//! Time beyond 32 bits of microseconds: no deadline of a device is early, late or in the past.
+//! Times beyond 32 bits of microseconds: no deadline of a device is early, late or in the past.
+
+use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
+use canopen::{Application, Device, Fault, Frame, Instant, NodeId, objects};
+
+use crate::exchange;
+use crate::types::Sent;
+
+const ID: u8 = 5;
+const VALUE: Object = Object::new(0x6000, 0, "", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
+const ROWS: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register(), objects::heartbeat_producer(1000)],
+    objects::node_guarding(),
+    objects::emergency(),
+    objects::identity(0, 1, 1),
+    objects::with(objects::tpdo(1, &[VALUE]), 5, 60_000),
+    [VALUE],
+);
+static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+
+const SECOND: u64 = 1_000_000;
+const HOUR: u64 = 3600 * SECOND;
+
+/// Counts the losses of the guarding master.
+#[derive(Default)]
+struct Losses(u32);
+
+impl Application for Losses {
+    fn fault(&mut self, fault: Fault, active: bool, _: &mut [u8]) {
+        self.0 += u32::from(fault == Fault::LifeGuard && active);
+    }
+}
+
+type Node = canopen::device!(Losses, ROWS);
+
+fn operational(start: u64) -> Node {
+    let mut node = Device::new(&DICTIONARY, NodeId::new(ID), Losses::default());
+    let _ = node.start(Instant(start), &mut Sent::default());
+    let _ = node.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(start), &mut Sent::default());
+    node
+}
+
+/// Polls at every deadline. Returns the instants of the frames with a CAN-ID.
+fn times(node: &mut Node, (begin, end): (u64, u64), id: u16) -> Vec<u64> {
+    let (mut times, mut now) = (vec![], begin);
+    while now < end {
+        let mut sent = Sent::default();
+        let next = node.poll(Instant(now), &mut sent);
+        times.extend(sent.0.iter().filter(|frame| frame.id() == id).map(|_| now));
+        assert!(next.action.is_some() || next.due() > Instant(now), "due in the past at {now}");
+        now = if next.action.is_some() { now } else { next.due().0 };
+    }
+    times
+}
+
+#[test]
+fn heartbeats_and_event_timers_keep_their_periods_for_hours() {
+    for start in [0, 31 * SECOND, u64::from(u32::MAX) - 5, 1 << 45] {
+        let end = start + 3 * HOUR;
+        let heartbeats = times(&mut operational(start), (start, end), 0x705);
+        assert_eq!(heartbeats.len(), 3 * 3600 - 1, "from {start}");
+        assert!(heartbeats.windows(2).all(|pair| pair[1] - pair[0] == SECOND));
+        let events = times(&mut operational(start), (start, end), 0x185);
+        assert_eq!(events.len(), 3 * 60 - 1, "from {start}");
+        assert!(events.windows(2).all(|pair| pair[1] - pair[0] == 60 * SECOND));
+    }
+}
+
+#[test]
+fn after_a_long_pause_the_next_heartbeat_is_a_period_away() {
+    let mut node = operational(0);
+    for pause in [34 * SECOND, 2 * HOUR, 100 * 24 * HOUR] {
+        let mut sent = Sent::default();
+        let next = node.poll(Instant(pause), &mut sent);
+        assert_eq!(sent.0.iter().filter(|frame| frame.id() == 0x705).count(), 1, "{pause}");
+        assert_eq!(next.services, Instant(pause + SECOND));
+    }
+}
+
+#[test]
+fn the_longest_life_time_ends_after_four_and_a_half_hours() {
+    let mut node = operational(0);
+    let mut write = |index, bytes: &[u8]| {
+        let ask = |request: Frame| {
+            let mut sent = Sent::default();
+            let _ = node.on_service_frame(&request, Instant(1), &mut sent);
+            sent.0
+        };
+        exchange::write(ID, canopen::sdo::Multiplexer { index, sub: 0 }, bytes, ask).unwrap();
+    };
+    write(0x1017, &[0, 0]);
+    write(0x100C, &[0xFF, 0xFF]);
+    write(0x100D, &[0xFF]);
+    let begin = 2 * SECOND;
+    let _ = node.on_frame(&Frame::remote(0x705, 1).unwrap(), Instant(begin), &mut Sent::default());
+    let end = begin + 65_535 * 255 * 1000;
+    times(&mut node, (begin, end), 0x705);
+    assert_eq!(node.application().0, 0, "the life time is not over");
+    let _ = node.poll(Instant(end), &mut Sent::default());
+    assert_eq!(node.application().0, 1);
+}

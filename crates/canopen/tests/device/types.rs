@@ -120,6 +120,6 @@ fn a_real64_is_sent_by_pdo() {
 #[test]
 fn the_eds_has_the_value_of_a_real64_and_not_its_bits() {
     let mut text = String::new();
-    eds::write(ROWS, &eds::DeviceInfo { vendor: "", product: "" }, &mut text).unwrap();
+    eds::write(ROWS, &eds::DeviceInfo::new("", ""), &mut text).unwrap();
     assert!(text.contains("DataType=0x0011\nAccessType=rwr\nDefaultValue=-0.1\n"), "{text}");
 }

@@ -1,7 +1,7 @@
 //! A wrong table does not compile. `check` is a constant function: here it runs with the test, and its message is the
 //! compile error.
 
-use canopen::dictionary::{Access, DefaultValue, Mapping, Object, Type, check};
+use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, Type, check};
 use canopen::objects;
 
 const INPUT: Object =
@@ -151,4 +151,54 @@ fn a_missing_field_is_named() {
     let error = std::panic::catch_unwind(|| objects::with(objects::rpdo(1, &[]), 3, 1)).unwrap_err();
     let message = error.downcast_ref::<String>().map(String::as_str);
     assert_eq!(message, Some("1400h:3: the object has no such row"));
+}
+
+#[test]
+fn a_service_has_the_rows_that_it_needs() {
+    let message = "1202h:0: further SDO servers begin at 1201h and have no gap";
+    assert_error(&[&objects::sdo_server(3)], message);
+    assert_eq!(compile_error(&[&objects::sdo_server(2), &objects::sdo_server(3)]), None);
+    let more = Object::new(0x1028, 128, "", Type::Unsigned32, Access::ReadWrite).value(1 << 31);
+    let message = "1028h:128: the sub-index is a node-ID, 1 to 127";
+    assert_error(&[&objects::emcy_consumer::<2>(), &[more]], message);
+    let ninth = Object::new(0x1010, 9, "", Type::Unsigned32, Access::ReadWrite);
+    let message = "1010h:9: storage groups of a product have the sub-indexes 4 to 8";
+    assert_error(&[&objects::store_parameters(), &[ninth]], message);
+    let own = Object::new(0x2000, 0, "", Type::Unsigned8, Access::ReadWrite).stored(Group::Own6);
+    assert_error(
+        &[&objects::store_parameters(), &[own]],
+        "2000h:0: 1010h has no sub-index for the storage group",
+    );
+    let heartbeat = Object::new(0x1017, 0, "", Type::Unsigned8, Access::ReadWrite);
+    assert_error(&[&[heartbeat]], "1017h:0: the service of the entry needs a type of another size");
+}
+
+#[test]
+fn the_attributes_of_a_row_fit_together() {
+    let row = |kind, access| Object::new(0x2000, 0, "", kind, access);
+    let write_only = row(Type::Unsigned8, Access::WriteOnly);
+    let text = |text| row(Type::VisibleString(3), Access::Const).default(DefaultValue::Text(text));
+    let cases = [
+        (write_only.stored(Group::Application), "a constant or a command cannot be stored"),
+        (write_only.mappable(Mapping::Tpdo), "a TPDO cannot carry a write-only object"),
+        (
+            row(Type::Domain, Access::ReadWrite).mappable(Mapping::Both),
+            "a mappable object has one to eight bytes",
+        ),
+        (text("four"), "the default is longer than the string"),
+        (text("\u{e4}"), "the default is not ASCII"),
+        (row(Type::Real32, Access::ReadWrite).limits(0, 1), "only an integer has limits"),
+        (
+            row(Type::Unsigned64, Access::ReadWrite).limits(0, 1),
+            "an integer of more than 32 bits has no limits",
+        ),
+        (row(Type::Real32, Access::ReadWrite).real(f32::NAN), "the default is infinite or not a number"),
+        (row(Type::Real32, Access::ReadWrite).value(1), "the default is an integer, the entry is not"),
+    ];
+    for (row, message) in cases {
+        assert_error(&[&[row]], &format!("2000h:0: {message}"));
+    }
+    let last = Object { sub: 255, ..row(Type::Unsigned8, Access::ReadWrite) };
+    let message = "2000h:255: an object has at most 255 entries, 0 to 254";
+    assert_error(&[&[row(Type::Unsigned8, Access::ReadWrite), last]], message);
 }

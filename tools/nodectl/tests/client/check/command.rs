@@ -16,7 +16,7 @@ fn file(name: &str) -> PathBuf {
 /// The data sheet of the device as a file.
 fn sheet(name: &str) -> String {
     let mut text = String::new();
-    let info = canopen::eds::DeviceInfo { vendor: "Test", product: "a device" };
+    let info = canopen::eds::DeviceInfo::new("Test", "a device");
     canopen::eds::write(device::table(None).0, &info, &mut text).expect("a string");
     let path = file(name);
     std::fs::write(&path, text).expect("a file");

@@ -174,7 +174,7 @@ pub(super) fn table(profile: Option<Profile>) -> Table {
 /// The data sheet of a device of a profile, as the library writes it and the reader of this crate reads it.
 pub(super) fn sheet(profile: Option<Profile>) -> eds::Eds {
     let mut text = String::new();
-    let info = canopen::eds::DeviceInfo { vendor: "Test", product: "a device" };
+    let info = canopen::eds::DeviceInfo::new("Test", "a device");
     canopen::eds::write(table(profile).0, &info, &mut text).expect("a string");
     eds::Eds::from_bytes(text.as_bytes()).expect("a data sheet")
 }
