@@ -37,7 +37,7 @@ pub(crate) fn every_frame_is_known(log: &[Stamped]) {
                 let known: &[u16] = if definition.producer == Some(DISPLAY) {
                     &[0x5000]
                 } else {
-                    &[0x2303, 0x2313, 0x63C0, 0x63C5]
+                    &[0x2303, 0x2313, 0x63B0, 0x63C0, 0x63C5]
                 };
                 assert!(known.contains(&mpdo.at.index), "{mpdo:?}");
             }

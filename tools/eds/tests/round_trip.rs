@@ -112,8 +112,24 @@ fn commands_are_excluded_from_a_download_and_what_is_stored_is_not() {
             let flags = eds.get(row.index, row.sub).unwrap().flags.unwrap();
             let acts = matches!(
                 row.index,
-                0x1003 | 0x1010 | 0x1011 | 0x1F51 | 0x2000 | 0x2108 | 0x2109 | 0x2200
-                    ..=0x2204 | 0x2322 | 0x2F00 | 0x6003 | 0x6010 | 0x6125 | 0x6382 | 0x6486 | 0x6925
+                0x1003 | 0x1010 | 0x1011 | 0x1F51 | 0x2000 | 0x2108 | 0x2109 | 0x2213 | 0x2200
+                    ..=0x2204
+                        | 0x2322
+                        | 0x2F00
+                        | 0x6003
+                        | 0x6010
+                        | 0x6125
+                        | 0x6139
+                        | 0x6382
+                        | 0x6486
+                        | 0x650E
+                        | 0x6610
+                        | 0x6611
+                        | 0x6925
+                        | 0x6939
+                        | 0x6D0E
+                        | 0x6E10
+                        | 0x6E11
             );
             let acts = acts
                 || matches!((row.index, row.sub), (0x2002, 2) | (0x2003, 3))

@@ -1,15 +1,19 @@
 //! The devices that are judged: an encoder with two channels, and two position units of a lift, each on one sensor.
 
-use profiles::board::{RETAINED_WORDS, RawEncoder, Retained};
+use profiles::board::{
+    Inputs, POSITION_RECORD_WORDS, PowerOn, RETAINED_WORDS, RawEncoder, RawSample, Retained,
+};
 use profiles::encoder::{
     ALARM_POSITION, CODE_SEQUENCE, Command, DIRECTION, Encoder, Format, Parameters, PositionRecord,
-    RetainedState, SCALING, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED, Scale, Sensor, Start,
+    RetainedState, SCALING, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED, Scale, Sensor, Snapshot, Start,
     WARNING_REFERENCE,
 };
 use profiles::lift::position::{self, NOT_REFERENCED, PositionUnits, Source, UNKNOWN, UnitValues};
 use profiles::profile::Chain;
 
-use std::num::NonZeroU32;
+use profiles::{Measurement, Personality, pressure};
+
+use std::num::{NonZeroU16, NonZeroU32};
 
 use crate::shaft::Case;
 use crate::tally::Reset;
@@ -36,10 +40,10 @@ pub(crate) trait Device {
     fn restart(&mut self, reset: Reset);
 }
 
-/// The start after a reset.
-fn start(words: [u32; RETAINED_WORDS], reset: Reset) -> Start {
+/// What a reset leaves of the retained words, and the record about them.
+fn kept(words: [u32; RETAINED_WORDS], reset: Reset) -> (Retained, Option<[u32; POSITION_RECORD_WORDS]>) {
     let retained = if reset == Reset::NoBattery { Retained::Nothing } else { Retained::Words(words) };
-    Start::of(retained, Some(PositionRecord::of(&words).to_words()))
+    (retained, Some(PositionRecord::of(&words).to_words()))
 }
 
 fn parameters(case: &Case) -> Parameters {
@@ -50,26 +54,87 @@ fn parameters(case: &Case) -> Parameters {
         (parameters.per_revolution, parameters.range) = (3600, 36_000);
         parameters.step = 10_000;
     }
+    if case.is_geared {
+        // Ten revolutions are three turns of a table with 3600 units.
+        (parameters.per_revolution, parameters.range) = (10_800, 3600);
+        parameters.gear = NonZeroU16::new(10).unwrap();
+    }
     parameters
 }
 
-pub(crate) struct EncoderDevice {
-    encoder: Encoder,
+/// What measures the shaft: the encoder alone, or the module of an encoder and a transmitter.
+pub(crate) trait Chained {
+    fn start(words: Retained, record: Option<[u32; POSITION_RECORD_WORDS]>) -> Self;
+    fn apply(&mut self, parameters: &Parameters);
+    fn sample(&mut self, raw: &RawEncoder) -> Snapshot;
+    fn words(&self) -> [u32; RETAINED_WORDS];
+}
+
+impl Chained for Encoder {
+    fn start(words: Retained, record: Option<[u32; POSITION_RECORD_WORDS]>) -> Encoder {
+        Encoder::new(Start::of(words, record))
+    }
+
+    fn apply(&mut self, parameters: &Parameters) {
+        Chain::apply(self, parameters);
+    }
+
+    fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
+        Encoder::sample(self, raw)
+    }
+
+    fn words(&self) -> [u32; RETAINED_WORDS] {
+        RetainedState::to_words(&self.retained_state())
+    }
+}
+
+/// The measurement of the combined personality.
+pub(crate) struct Combined(Measurement, profiles::Snapshot);
+
+impl Chained for Combined {
+    fn start(retained: Retained, stored: Option<[u32; POSITION_RECORD_WORDS]>) -> Combined {
+        let power_on = PowerOn { retained, stored, ..PowerOn::default() };
+        Combined(Measurement::new(Personality::Combined, &power_on), profiles::Snapshot::default())
+    }
+
+    fn apply(&mut self, parameters: &Parameters) {
+        self.0.apply(&profiles::Parameters::Combined((*parameters, pressure::Parameters::default())));
+    }
+
+    fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
+        let analogue =
+            RawSample { pressure: 0, supply: 0, temperature: 0, reference: 0, thermistor: 0, count: 16 };
+        let inputs = Inputs { analogue, position: *raw, digital: [false; 2] };
+        self.0.update(&inputs, &mut self.1);
+        let profiles::Snapshot::Combined((snapshot, _)) = self.1 else { panic!("another personality") };
+        snapshot
+    }
+
+    fn words(&self) -> [u32; RETAINED_WORDS] {
+        let mut words = [0; RETAINED_WORDS];
+        assert!(self.0.retain(&mut words));
+        words
+    }
+}
+
+pub(crate) struct EncoderDevice<E> {
+    encoder: E,
     parameters: Parameters,
     /// What the parameter store holds.
     stored: Parameters,
 }
 
-impl EncoderDevice {
-    pub(crate) fn new(case: &Case) -> EncoderDevice {
+impl<E: Chained> EncoderDevice<E> {
+    pub(crate) fn new(case: &Case) -> EncoderDevice<E> {
         let parameters = parameters(case);
-        let mut device = EncoderDevice { encoder: Encoder::default(), parameters, stored: parameters };
+        let mut device =
+            EncoderDevice { encoder: E::start(Retained::Nothing, None), parameters, stored: parameters };
         device.encoder.apply(&parameters);
         device
     }
 }
 
-impl Device for EncoderDevice {
+impl<E: Chained> Device for EncoderDevice<E> {
     fn sensor(&self) -> Sensor {
         self.parameters.sensors().next().unwrap()
     }
@@ -114,8 +179,8 @@ impl Device for EncoderDevice {
     }
 
     fn restart(&mut self, reset: Reset) {
-        let words = RetainedState::to_words(&self.encoder.retained_state());
-        self.encoder = Encoder::new(start(words, reset));
+        let (retained, record) = kept(self.encoder.words(), reset);
+        self.encoder = E::start(retained, record);
         self.parameters = self.stored;
         self.encoder.apply(&self.parameters);
     }
@@ -180,7 +245,8 @@ impl Device for LiftDevice {
 
     fn restart(&mut self, reset: Reset) {
         let words = self.units.retained_state().to_words();
-        self.units = PositionUnits::new(start(words, reset));
+        let (retained, record) = kept(words, reset);
+        self.units = PositionUnits::new(Start::of(retained, record));
         self.parameters = self.stored;
         self.units.apply(&self.parameters);
     }

@@ -10,8 +10,8 @@ mod devices;
 mod shaft;
 mod tally;
 
-use devices::{Device, EncoderDevice, LiftDevice};
-use profiles::encoder::SensorType;
+use devices::{Combined, Device, EncoderDevice, LiftDevice};
+use profiles::encoder::{Encoder, SensorType};
 use shaft::{Case, World};
 use tally::Tally;
 
@@ -32,18 +32,21 @@ const KINDS: [SensorType; 9] = [
     SensorType::LinearCyclic,
 ];
 
-/// Every sensor type, with the range of its code and with another one, with and without an index.
+/// Every sensor type, with the range of its code, with another one and behind a gear, with and without an index.
 fn cases() -> impl Iterator<Item = Case> {
     KINDS.into_iter().flat_map(|kind| {
         let indexes: &[bool] = if kind.is_absolute() { &[false] } else { &[false, true] };
-        let case = move |(index, is_scaled)| Case { kind, index, is_scaled };
-        indexes.iter().flat_map(move |index| [(*index, false), (*index, true)].map(case))
+        let case = move |(index, is_scaled, is_geared)| Case { kind, index, is_scaled, is_geared };
+        let scales = [(false, false), (true, false), (true, true)];
+        let scaled =
+            move |index: &bool| scales.map(|(is_scaled, is_geared)| case((*index, is_scaled, is_geared)));
+        indexes.iter().flat_map(scaled)
     })
 }
 
-fn judge<D: Device>(seed: u64, new: impl Fn(&Case) -> D) -> Tally {
+fn judge<D: Device>(seed: u64, cases: impl Iterator<Item = Case>, new: impl Fn(&Case) -> D) -> Tally {
     let mut all = Tally::default();
-    for (number, case) in (0..).zip(cases()) {
+    for (number, case) in (0..).zip(cases) {
         let mut world = World::new(case, new(&case), seed + number);
         (0..cycles()).for_each(|_| world.cycle());
         all.add(world.tally);
@@ -54,10 +57,15 @@ fn judge<D: Device>(seed: u64, new: impl Fn(&Case) -> D) -> Tally {
 
 #[test]
 fn an_encoder_never_shows_a_wrong_position_as_right() {
-    judge(1, EncoderDevice::new).assert_good();
+    judge(1, cases(), EncoderDevice::<Encoder>::new).assert_good();
+}
+
+#[test]
+fn the_encoder_of_a_combined_device_never_shows_a_wrong_position_as_right() {
+    judge(2000, cases(), EncoderDevice::<Combined>::new).assert_good();
 }
 
 #[test]
 fn position_units_of_a_lift_never_show_a_wrong_position_as_right() {
-    judge(1000, LiftDevice::new).assert_good();
+    judge(1000, cases().filter(|case| !case.is_geared), LiftDevice::new).assert_good();
 }

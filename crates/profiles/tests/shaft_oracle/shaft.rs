@@ -11,6 +11,8 @@ pub(crate) struct Case {
     pub(crate) kind: SensorType,
     pub(crate) index: bool,
     pub(crate) is_scaled: bool,
+    /// An endless axis behind a gear.
+    pub(crate) is_geared: bool,
 }
 
 /// Numbers that look random (SplitMix64).
@@ -297,7 +299,9 @@ impl<D: Device> World<D> {
             return (self.random.signed() * part * self.code() as f64).trunc();
         }
         if self.random.one_in(4) {
-            self.speed = self.random.signed() * self.fastest();
+            // One that creeps is seen when it has left its place by more than a step: some milliseconds later.
+            let part = self.random.signed();
+            self.speed = part * self.fastest() + 4.0 * part.signum();
             self.target = self.speed;
             return self.random.signed() * 50_000.0;
         }

@@ -258,18 +258,20 @@ impl Functions {
         self.states.store(image, [shown]);
         self.general.store(image, [(shown != 0).into()]);
     }
+}
 
+impl States {
     /// A client has written an object. `index` is without the shift.
     #[inline(never)]
-    pub(super) fn written(&self, index: u16, sub: u8, value: u8, states: &mut States) {
+    pub(super) fn written(&mut self, index: u16, sub: u8, value: u8) {
         let channels = if sub == 2 { 2 } else { 1 };
         match index {
             // Another unit, offset or tare: the extremes would be those of another value.
-            0x6124..=0x6131 | 0x6139 | 0x2210 => states.restart(channels),
-            0x2213 => states.restart(value),
-            0x650E => states.latched &= !(1_u8.checked_shl(u32::from(sub).wrapping_sub(1)).unwrap_or(0)),
-            0x6610 => states.latched = 0,
-            0x6611 => states.latched &= !value,
+            0x6124..=0x6131 | 0x6139 | 0x2210 => self.restart(channels),
+            0x2213 => self.restart(value),
+            0x650E => self.latched &= !(1_u8.checked_shl(u32::from(sub).wrapping_sub(1)).unwrap_or(0)),
+            0x6610 => self.latched = 0,
+            0x6611 => self.latched &= !value,
             _ => {}
         }
     }

@@ -104,7 +104,7 @@ impl Profile for Objects {
         let index = entry.index();
         let index = if index < 0x6000 { index } else { index.wrapping_sub(self.fields.shift) };
         let value = entry.field().u8(image);
-        self.fields.functions.written(index, entry.sub(), value, &mut self.states);
+        self.states.written(index, entry.sub(), value);
     }
 
     fn is_quiet(&self, place: usize) -> bool {

@@ -19,5 +19,9 @@ export const NODE = {
   0x2202: "How often the device was calibrated, and when last (20251231 is a date).",
   0x2203: "Opens the calibration for writes.",
   0x2204: "Saves the calibration: the signature \"save\" (65766173h) is wanted.",
+  0x2210: "Subtracted from the measured value. 6139h finds it.",
+  0x2211: "The lowest measured value.",
+  0x2212: "The highest measured value.",
+  0x2213: "Forgets 2211h and 2212h: bit 0 of the pressure, bit 1 of the temperature.",
   0x2f00: "4 KiB of memory in which a transfer can be tried out: it reads as it was written.",
 };
