@@ -93,7 +93,7 @@ fn headers() -> Vec<Kind> {
         ("zeros", vec![0; LENGTH], UNKNOWN_FORMAT),
         ("code without a header", code(), UNKNOWN_FORMAT),
         ("another magic number", header(flip(0)), UNKNOWN_FORMAT),
-        ("another format", header(put(4, 2)), UNKNOWN_FORMAT),
+        ("the format before", header(put(4, 1)), UNKNOWN_FORMAT),
         ("a bit of the header", bytes(flip(17)), CRC),
         ("a bit of the header's CRC", bytes(flip(HEADER_LEN - 1)), CRC),
         ("reserved bytes in use", header(put(300, 1)), CRC),
@@ -104,7 +104,7 @@ fn headers() -> Vec<Kind> {
 }
 
 fn contents() -> Vec<Kind> {
-    let stranger = Image::sign(*good().header.description(), code(), &SigningKey::from_bytes(&[7; 32]));
+    let stranger = Image::sign(good().header.description(), code(), &SigningKey::from_bytes(&[7; 32]));
     let other_code = header(|bytes| {
         flip(HEADER_LEN + 8)(bytes);
         let crc = checksum(&bytes[HEADER_LEN..]);
