@@ -4,8 +4,6 @@
 use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
-use host_tests::watch::expects;
-use monitor::Rule;
 use sign::image::Image;
 use update::{Description, HEADER_LEN, SIGNED_LEN};
 
@@ -148,7 +146,6 @@ fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
 /// Only the security counter of a confirmed image is in force, so the test takes two updates.
 #[test]
 fn an_image_with_a_lower_counter_is_refused() {
-    let _expected = expects([Rule::SdoProtocol]);
     const COUNTER: u8 = 66;
     let code = version_a().code;
     let newer = signed(code.clone(), |about| about.counter = 3);
