@@ -38,6 +38,7 @@ pub enum Proof {
 
 /// The result of the decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::large_enum_variant, reason = "there is one decision, and no heap")]
 pub enum Decision {
     /// Start the application; this is its header.
     Start(Header),

@@ -90,8 +90,8 @@ impl CrcCheck {
 }
 
 /// A full check of an image in progress: first its content, then the certificates in its header, from the highest rank on,
-/// then its signature. The signature is verified twice, starting from the hash of the image, so that a single skipped
-/// instruction or wrong bit spoils only one of the two verifications.
+/// then its signature. Each signature is verified twice, so that a single skipped instruction or wrong bit spoils only one of
+/// the two verifications.
 pub(crate) struct FullCheck {
     header: Header,
     crc: CrcCheck,
@@ -105,7 +105,7 @@ pub(crate) struct FullCheck {
     word: u32,
 }
 
-/// Number of verifications of the signature of an image.
+/// Number of verifications of each signature.
 const TWICE: u32 = 2;
 /// What each complete verification adds to the word, so that none can be left out.
 const VERIFIED: u32 = 0x9E37_79B9;
@@ -171,7 +171,7 @@ impl FullCheck {
     fn rank(&self) -> Rank {
         match self.rest {
             0..=TWICE => Rank::Release,
-            3 => Rank::Root,
+            3..=4 => Rank::Root,
             _ => Rank::Recovery,
         }
     }
@@ -193,5 +193,5 @@ impl FullCheck {
 fn verifications(header: &Header) -> u32 {
     let certificates =
         u32::from(header.generation() != 0).wrapping_add((header.root_generation() != 0).into());
-    certificates.wrapping_add(TWICE)
+    certificates.wrapping_add(1).wrapping_mul(TWICE)
 }

@@ -46,7 +46,9 @@ impl Message {
 #[inline(never)] // Many callers, and little room in flash.
 pub(crate) fn hash(parts: &[&[u8]]) -> [u8; HASH_LEN] {
     let mut hash = Sha512::new();
-    parts.iter().for_each(|part| hash.update(part));
+    for part in parts {
+        hash.update(part);
+    }
     hash.finalize().into()
 }
 

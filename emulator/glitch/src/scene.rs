@@ -202,5 +202,5 @@ fn downloaded() -> Result<MockFlash> {
 }
 
 fn target() -> Target {
-    Target { layout: LAYOUT, board: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
+    Target { layout: LAYOUT, board: product::BOARD, hardware: 0, keys: &PUBLIC_KEYS }
 }

@@ -77,7 +77,7 @@ fn target() -> Target {
         Area::new(2304, &[512, 1024]),
         Area::new(3840, &[512, 1024]),
     );
-    Target { layout: layout.expect("they fit"), board: BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
+    Target { layout: layout.expect("they fit"), board: BOARD, hardware: 0, keys: &PUBLIC_KEYS }
 }
 
 fn image(major: u16, len: usize) -> Image {

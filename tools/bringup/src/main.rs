@@ -96,7 +96,7 @@ fn desk(cli: &Cli) -> Result<RealDesk> {
     let read =
         |path: &PathBuf| std::fs::read(path).with_context(|| format!("cannot read {}", path.display()));
     let key = sign::key::development();
-    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, None)?;
+    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, Vec::new())?;
     let (address, bit_rate) = (cli.bus.clone(), cli.bit_rate);
     let network = Network::open(move || address.open(bit_rate))?;
     Ok(RealDesk {

@@ -45,7 +45,7 @@ pub(crate) fn certificate(generation: u32, counter: u32, key: u8, by: u8) -> Cer
 
 pub(crate) fn target() -> Target {
     let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA, KEPT_AREA).unwrap();
-    Target { layout, board: BOARD, hardware: REVISION, keys: &*PUBLIC_KEYS }
+    Target { layout, board: BOARD, hardware: REVISION, keys: &PUBLIC_KEYS }
 }
 
 /// A header and its code, as consistent as the test needs; [`Image::bytes`] are the bytes sent over the bus.

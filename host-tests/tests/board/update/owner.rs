@@ -120,7 +120,6 @@ fn a_stolen_release_key_is_revoked_in_the_field() {
 /// A thief has the root key too. The recovery key certifies another one.
 #[test]
 fn a_stolen_root_key_is_revoked_in_the_field() {
-    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = bench();
     let stolen = signed(&version_a(), list(KeyList::default(), 15, OWNER[1]), NEXT_RELEASE);
     confirmed(&mut bench, &stolen);
@@ -133,6 +132,7 @@ fn a_stolen_root_key_is_revoked_in_the_field() {
 /// The release key raises the security counter by 16 with an image.
 #[test]
 fn the_release_key_raises_the_counter_by_a_bounded_step() {
+    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = bench();
     let image = version_a();
     let about = Description { counter: 17, ..image.header.description() };
