@@ -64,6 +64,7 @@ impl Rate {
     }
 }
 
+/// Frames of the rate before count for no other rate, and frames without filters are not for this node.
 fn drop_all(frames: &mut Frames) {
     while frames.dequeue().is_some() {}
 }

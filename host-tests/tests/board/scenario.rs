@@ -84,6 +84,9 @@ pub(crate) fn observe(
     if matches!(node, Node::Saving | Node::LowSupply) {
         saves(&mut world, &master, &mut said);
     }
+    if node == Node::LowSupply {
+        told(&world.summary(1.0, 0), &mut said);
+    }
     said
 }
 

@@ -144,9 +144,34 @@ fn measure(world: &mut World, task: &Task) -> Measured {
     }
 }
 
-/// The place of the task that sends. Each frame on the bus is sent or received by the node, and to send one takes the
-/// longer time. For the tasks after this one, all frames therefore count as sent.
+/// The places of the tasks.
+const RECEIVE: usize = 0;
+const SAMPLE: usize = 1;
 const TRANSMIT: usize = 2;
+const PROCESS: usize = 3;
+
+/// The longest time that more urgent tasks take of a span, in us.
+///
+/// A frame on the bus is sent or received by the node, not both. Up to the task that sends, all frames count for each task.
+/// For the task of the process data, all count as sent, which takes longer than to receive one. For the tasks after it, the
+/// bus is full of the frames that take the longest for their length: sent ones, or process data that is received. A sample
+/// also wakes the task of the process data.
+fn preempted(tasks: &[(Task, Measured)], place: usize, span: f64) -> f64 {
+    let worst = |at: usize| tasks[at].1.worst;
+    let of = |at: usize| ((span / tasks[at].0.period).ceil() + tasks[at].0.burst) * worst(at);
+    match place {
+        ..=TRANSMIT => (0..place).map(of).sum(),
+        PROCESS => of(SAMPLE) + of(TRANSMIT),
+        _ => {
+            let received = worst(RECEIVE) + worst(PROCESS);
+            let frames = of(TRANSMIT).max((span / FULL_FRAME).ceil() * received);
+            // One frame of the other kind, of which a part is in the span, and those that wait in mailboxes.
+            let parts = received + tasks[TRANSMIT].0.burst * worst(TRANSMIT);
+            let woken = (span / tasks[SAMPLE].0.period).ceil() * worst(PROCESS);
+            frames + parts + woken + of(SAMPLE) + (PROCESS + 1..place).map(of).sum::<f64>()
+        }
+    }
+}
 
 /// R of the task at this place, or `None` when R exceeds the deadline.
 fn response(tasks: &[(Task, Measured)], place: usize) -> Option<f64> {
@@ -156,10 +181,7 @@ fn response(tasks: &[(Task, Measured)], place: usize) -> Option<f64> {
     loop {
         // A request that comes while the task runs waits for the end of this run. Further ones are one with it.
         let runs = if response > task.period { 2.0 } else { 1.0 };
-        let others = tasks[..place].iter().filter(|(task, _)| place <= TRANSMIT || task.name != "receive");
-        let preempted: f64 =
-            others.map(|(higher, its)| ((response / higher.period).ceil() + higher.burst) * its.worst).sum();
-        let next = blocking + runs * own.worst + preempted;
+        let next = blocking + runs * own.worst + preempted(tasks, place, response);
         if next > task.deadline {
             return None;
         }
