@@ -1,7 +1,5 @@
 //! CAN-IDs, and COB-IDs as the dictionary stores them.
 
-use crate::sdo::Abort;
-
 /// An 11-bit CAN-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -42,8 +40,8 @@ impl CanId {
 
     /// The identifier with the function code of this one for a node-ID; `None` beyond 127.
     pub(crate) fn of_node(self, node: usize) -> Option<CanId> {
-        let node = u8::try_from(node).ok().and_then(crate::NodeId::new)?;
-        Some(CanId::of_service(self.0, node.get()))
+        let node = u8::try_from(node).ok().filter(|node| matches!(node, 1..=127))?;
+        Some(CanId::of_service(self.0, node))
     }
 
     /// One of the two identifiers of LSS (CiA 305): 0 for the responses, 1 for the requests.
@@ -82,24 +80,6 @@ impl CobId {
             return None;
         }
         Some(CobId { id: CanId(id as u16), bit31: value & 1 << 31 != 0, bit30: value & 1 << 30 != 0 })
-    }
-
-    /// Checks a new value of a COB-ID that bit 31 disables (EMCY, SDO): the CAN-ID of an enabled service does not
-    /// change, and must not be restricted.
-    pub(crate) fn check_change(old: u32, new: u32) -> Result<(), Abort> {
-        let id = CobId::check_place(old, new)?;
-        if id.is_some_and(CanId::is_restricted) { Err(Abort::InvalidValue) } else { Ok(()) }
-    }
-
-    /// As [`check_change`](CobId::check_change), for a service that can use a restricted CAN-ID. Returns the CAN-ID of an
-    /// enabled service.
-    pub(crate) fn check_place(old: u32, new: u32) -> Result<Option<CanId>, Abort> {
-        let is_enabled = |value: u32| value >> 31 == 0;
-        let moves = is_enabled(old) && is_enabled(new) && old != new;
-        match CobId::enabled(new & !(1 << 31)).filter(|_| !moves) {
-            Some(id) => Ok(Some(id).filter(|_| is_enabled(new))),
-            None => Err(Abort::InvalidValue),
-        }
     }
 
     /// The CAN-ID of an enabled service of base frames: all bits above the CAN-ID are 0.

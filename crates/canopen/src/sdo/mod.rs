@@ -9,6 +9,7 @@ mod block_download;
 mod block_upload;
 mod bytes;
 mod channel;
+mod cob_id;
 pub(crate) mod crc;
 mod objects;
 mod request;
