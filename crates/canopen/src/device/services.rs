@@ -152,8 +152,19 @@ impl<D: Definition> Device<D> {
         let lss = D::Application::LSS.then_some(lss::REQUEST);
         let own = self.inner.node_id.filter(|_| Inner::<D>::has(Has::GUARDING));
         let guarding = own.map(|own| own.service(ERROR_CONTROL));
-        let own = [lss, sdo, guarding].into_iter().flatten().chain(self.inner.watches.ids());
-        own.chain(self.inner.more_service_ids())
+        // One state instead of a chain of iterators, whose parts stay in an image that has no such services.
+        let (own, mut at) = ([lss, sdo, guarding], 0);
+        let (mut watched, mut more) = (self.inner.watches.ids(), self.inner.more_service_ids());
+        core::iter::from_fn(move || {
+            while let Some(id) = own.get(at) {
+                at += 1;
+                if id.is_some() {
+                    return *id;
+                }
+            }
+            let watched = if Inner::<D>::has(Has::HEARTBEAT_CONSUMER) { watched.next() } else { None };
+            watched.or_else(|| more.next())
+        })
     }
 
     /// Takes a segment of a block that only needs a place in the buffer. In any state: without SDO, there is no transfer.
