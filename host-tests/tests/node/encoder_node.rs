@@ -267,7 +267,7 @@ fn a_tpdo_of_type_255_waits_for_the_change_threshold() {
     bench.take();
     for counter in (1..=250_u16).chain((1..250).rev()) {
         turn_to(&mut bench, counter);
-        assert_eq!(number(&mut bench, 0x6004, 0), counter.into());
+        assert_eq!(number(&mut bench, 0x6004, 0), u32::from(counter));
     }
     assert_eq!(positions(&mut bench, TPDO1), [100, 200, 100]);
     bench.write(0x2112, 1, &[0; 4]).unwrap();
