@@ -138,11 +138,14 @@ impl Services {
         node: &mut impl Shared,
         call: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> Next,
     ) -> Next {
-        let (next, parameters) = node.call(|protocol, out| {
+        let parameters = &mut self.parameters;
+        let next = node.call(|protocol, out| {
             let next = call(protocol, out);
-            (next, next.parameters.then(|| protocol.parameters()))
+            if next.parameters {
+                note_parameters(parameters, protocol);
+            }
+            next
         });
-        self.parameters = parameters.or(self.parameters.take());
         if next.process <= Clock::now() {
             rtic::pend(PROCESS);
         }
@@ -303,4 +306,10 @@ fn restart() -> ! {
 /// One flash a second.
 fn blink(now: Instant) -> bool {
     now.0 % 1_000_000 < 100_000
+}
+
+/// Notes the parameters of the protocol. Not inlined, because they take half a kibibyte of the stack of each caller.
+#[inline(never)]
+fn note_parameters(place: &mut Option<Parameters>, protocol: &Protocol) {
+    *place = Some(protocol.parameters());
 }

@@ -12,7 +12,7 @@ impl Protocol {
             let Ok(entry) = application.setup.personality.dictionary().find(SELF_TEST, 0) else { return };
             let written = entry.field().u32(image);
             if written >> 8 == SELF_TEST_KEY {
-                entry.field().set_u32(image, value(written as u8));
+                entry.field().set_u32(image, value(written.to_le_bytes()[0]));
             }
         });
     }

@@ -186,7 +186,7 @@ impl Printer<'_> {
             match record? {
                 (at, Record::Frame(frame)) => self.frame(session, &frame, at)?,
                 (at, Record::Foreign(frame)) => {
-                    self.lines(session, vec![Decoder::on_foreign(frame, at)], at)?
+                    self.lines(session, vec![Decoder::on_foreign(frame, at)], at)?;
                 }
             }
         }

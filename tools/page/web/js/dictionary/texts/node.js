@@ -6,6 +6,7 @@ export const NODE = {
   0x2002: "The trial of a new program: whether it may still be taken back, the command that ends it, and its times in s (0: none).",
   0x2003: "Who may change the program: whether the node asks for it (0: it does not, 1: closed, 2: open until the next start), the challenge of this start, and where the response goes.",
   0x2004: "The board, as a code: an update must be for this board.",
+  0x2005: "Values of the board for its bring-up: write the number of a value, then read the value.",
   0x2010: "Room and wear of the memory for parameters: saves that still fit, page erases so far, and page erases that are allowed now.",
   0x2100: "What measures the position: kind of shaft or rod, and how it is read.",
   0x2101: "Steps of the sensor: per revolution of an incremental shaft, nm a step for a rod. An absolute shaft has them in 2103h.",
