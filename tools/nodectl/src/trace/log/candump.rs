@@ -121,7 +121,7 @@ mod tests {
     use canopen::Frame;
 
     fn record(line: &str) -> (u64, Record) {
-        parse(line).map(|(at, record)| (at.0, record)).unwrap_or_else(|_| panic!("{line}"))
+        parse(line).map_or_else(|_| panic!("{line}"), |(at, record)| (at.0, record))
     }
 
     #[test]
