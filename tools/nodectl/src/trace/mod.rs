@@ -9,7 +9,7 @@ mod pdo;
 mod sdo;
 mod services;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use canopen::sdo::Multiplexer;
 use canopen::{Frame, Instant, NodeId};
@@ -122,6 +122,8 @@ pub struct Decoder {
     nodes: BTreeMap<NodeId, Knowledge>,
     pdos: Pdos,
     transfers: Transfers,
+    /// Nodes with a transfer whose begin is not in the trace. Its first frame is shown.
+    without_begin: BTreeSet<NodeId>,
     states: States,
 }
 
@@ -180,8 +182,10 @@ impl Decoder {
                 let is_within = self.transfers.has(node);
                 let events = self.transfers.on_frame(node, frame, at);
                 if events.is_empty() && !is_within && !self.transfers.has(node) {
-                    return one(Kind::Sdo, Some(node), Some(sdo::without_begin(frame)));
+                    let is_first = self.without_begin.insert(node);
+                    return one(Kind::Sdo, Some(node), is_first.then(|| sdo::without_begin(frame)));
                 }
+                self.without_begin.remove(&node);
                 let lines = events.into_iter().map(|event| {
                     self.pdos.note(node, known, &event);
                     said(Kind::Sdo, Some(node), event.say(known, node))

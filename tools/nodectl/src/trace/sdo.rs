@@ -166,9 +166,9 @@ impl Transfers {
     }
 }
 
-/// A frame of a transfer whose begin is not in the trace, or that is no SDO message.
+/// The first frame of a transfer whose begin is not in the trace, or that is no SDO message.
 pub(super) fn without_begin(frame: &Frame) -> Said {
-    Said::text(format!("part of a transfer without its begin: {}", hex(frame)))
+    Said::text(format!("transfer without its begin: {}", hex(frame)))
 }
 
 impl Transfer {

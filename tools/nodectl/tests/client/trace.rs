@@ -225,6 +225,20 @@ fn a_file_of_candump_needs_no_bus() {
     assert_eq!(failed(&wire, &["trace", "--file", file]).0, 7);
 }
 
+/// A log that begins within a block download: its first segment is shown, and the next transfer is whole.
+#[test]
+fn a_transfer_without_its_begin_is_one_line() {
+    let lines = texts(&[
+        (0x605, &[2, 1, 2, 3, 4, 5, 6, 7]),
+        (0x605, &[0x83, 1, 2, 3, 4, 5, 6, 7]),
+        (0x585, &[0xA2, 3, 127, 0, 0, 0, 0, 0]),
+        (0x605, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]),
+        (0x585, &[0x43, 0x00, 0x10, 0, 0x94, 1, 2, 0]),
+    ]);
+    assert_eq!(lines[0], "transfer without its begin: 02 01 02 03 04 05 06 07");
+    assert!(lines.len() == 2 && lines[1].starts_with("read 1000h"), "{lines:?}");
+}
+
 /// The same boot-up message and command in the logs of three programs.
 #[test]
 fn logs_of_other_programs_are_read() {
