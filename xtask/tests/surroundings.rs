@@ -61,6 +61,13 @@ impl Machine {
         self.with("chromium", WORKS).with("chromedriver", WORKS)
     }
 
+    /// The files that the fake cargo does not build.
+    fn has_images(&self) {
+        let images = self.root.join("target/thumbv7em-none-eabihf/release");
+        fs::create_dir_all(&images).unwrap();
+        ["firmware", "bootloader"].iter().for_each(|name| fs::write(images.join(name), "").unwrap());
+    }
+
     fn closed(mut self) -> Machine {
         self.is_closed = true;
         self
@@ -205,6 +212,7 @@ fn without_a_board_nothing_is_built() {
 #[test]
 fn with_a_board_both_programs_are_built() {
     let machine = Machine::new("board").with("probe-rs", "echo '[0]: STLink V2-1'");
+    machine.has_images();
     let says = String::from_utf8(machine.xtask(&["flash", "--development"]).stderr).unwrap();
     assert!(says.contains("cannot start") && says.contains("flash"), "{says}");
     let calls = machine.calls("cargo");

@@ -244,7 +244,7 @@ fn cams_are_switched_by_rpdo_and_objects_say_what_the_board_can_do() {
         // Cam 2 is not at 0, and its inverted state is shown.
         assert_eq!(read(&mut world, &master, (0x6300, 1)), cams, "{data:x?}");
     }
-    assert_eq!(read(&mut world, &master, (0x6506, 0)), 0x2D, "neither light nor battery");
+    assert_eq!(read(&mut world, &master, (0x6506, 0)), 0x102D, "speed of 6030h, neither light nor battery");
     assert_eq!(read(&mut world, &master, (0x6507, 0)), 0x0010_0300, "0.1.0 as 100Ah, profile 3.0");
     write(&mut world, &master, (0x6001, 0), 4, u32::MAX);
     write(&mut world, &master, (0x6002, 0), 4, u32::MAX);

@@ -117,6 +117,7 @@ fn commands_are_excluded_from_a_download_and_what_is_stored_is_not() {
                         | 0x2322
                         | 0x2F00
                         | 0x6003
+                        | 0x2005
                         | 0x6010
                         | 0x6125
                         | 0x6139

@@ -134,7 +134,10 @@ mod tests {
         assert_eq!(says(0x6131, 1, 0xFD4E_0000).as_deref(), Some("mbar"));
         assert_eq!(says(0x6150, 1, 0).as_deref(), Some("valid"));
         assert_eq!(says(0x6150, 1, 3).as_deref(), Some("not valid, positive overload"));
-        assert_eq!(says(0x1003, 1, 0x0001_8130).as_deref(), Some("8130h heartbeat or life guarding error"));
+        assert_eq!(
+            says(0x1003, 1, 0x0001_8130).as_deref(),
+            Some("8130h heartbeat of a watched node is missing")
+        );
         assert_eq!(says(0x6131, 0, 2), None);
         assert_eq!(says(0x1017, 0, 1000), None);
         let nan = of(&catalogue, at(0x6130, 1), &Value::Real32(f32::NAN));

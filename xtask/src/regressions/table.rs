@@ -27,7 +27,7 @@ pub(super) struct Edit {
 /// A deadline in the past reaches the caller.
 const PAST_DEADLINES: Edit = Edit {
     file: "crates/canopen/src/device/process.rs",
-    mended: "self.process_due = due.max(context.now.plus(Duration(1)));",
+    mended: "self.process_due = due.max(context.now.plus(Span(1)));",
     fault: "self.process_due = due;",
 };
 

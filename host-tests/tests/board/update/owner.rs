@@ -102,7 +102,6 @@ fn it_takes_what_its_owner_has_signed_and_nothing_else() {
 /// image on, nothing that the stolen key has signed is accepted or started.
 #[test]
 fn a_stolen_release_key_is_revoked_in_the_field() {
-    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = bench();
     let stolen = signed_by_owner(&version_a());
     confirmed(&mut bench, &stolen);

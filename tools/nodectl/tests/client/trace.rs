@@ -46,7 +46,7 @@ fn services_in_words() {
             0x085,
             &[0, 0, 0, 1, 0, 0, 0, 2],
             Kind::Emcy,
-            "0000h no error, error register 00h, manufacturer 01 00 00 00 02",
+            "0000h no fault is left, error register 00h, manufacturer 01 00 00 00 02",
         ),
         (0x705, &[0], Kind::Heartbeat, "boot-up"),
         (0x705, &[0x7F], Kind::Heartbeat, "pre-operational"),

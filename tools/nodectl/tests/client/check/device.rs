@@ -182,7 +182,7 @@ pub(super) fn sheet(profile: Option<Profile>) -> eds::Eds {
 /// The stored parameters, by group.
 #[derive(Default)]
 pub(super) struct App {
-    stored: [Vec<u8>; 3],
+    stored: [Vec<u8>; Group::ALL.len()],
 }
 
 impl Application for App {
