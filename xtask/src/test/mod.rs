@@ -1,7 +1,7 @@
 //! `cargo xtask test`: every check of the project.
 //!
 //! Two lanes compile at the same time, one for this machine and one for the Cortex-M4. Then the tests run, each in a
-//! process of its own: one test per core, and three per core of the tests that mostly wait. The two lanes go on beside
+//! process of its own: one test per core, and two per core of the tests that mostly wait. The two lanes go on beside
 //! the tests with lints and documentation. The output of a failed step or test is printed; all output is in
 //! target/test-logs.
 

@@ -16,7 +16,7 @@ use crate::command::{target_dir, with_log};
 const SLOWEST: usize = 12;
 
 /// Tests that mostly wait run beside the others: this many for each core.
-const WAITING: usize = 3;
+const WAITING: usize = 2;
 
 /// The period of printing the number of finished tests.
 const PERIOD: Duration = Duration::from_secs(20);
