@@ -79,8 +79,8 @@ pub(super) const MENDS: &[Mend] = &[
             PAST_DEADLINES,
             Edit {
                 file: "crates/canopen/src/pdo/scanner.rs",
-                mended: "if elapsed || self.is_pending && settings.event != 0 && self.event_due == Instant::NEVER {",
-                fault: "if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {",
+                mended: "if elapsed || self.is_pending && settings.event != 0 && self.event_due == Tick::NEVER {",
+                fault: "if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Tick::NEVER) {",
             },
         ],
     },
@@ -124,8 +124,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "inhibit::an_inhibit_time_outlasts_writes_and_remote_frames",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/tpdo.rs",
-            mended: "(self.event_due, self.inhibited_until) = (Instant::NEVER, self.settings.inhibit_end(self.sent));",
-            fault: "(self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));",
+            mended: "(self.event_due, self.inhibited_until) = (Tick::NEVER, self.settings.inhibit_end(self.sent));",
+            fault: "(self.event_due, self.inhibited_until) = (Tick::NEVER, Instant(0));",
         }],
     },
     Mend {
@@ -227,8 +227,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "inhibit::an_inhibit_time_separates_events",
         edits: &[Edit {
             file: "crates/canopen/src/pdo/tpdo.rs",
-            mended: "=> sent.plus(Duration::from_inhibit(self.inhibit)),",
-            fault: "=> sent.plus(Duration::from_inhibit(self.inhibit / 2)),",
+            mended: "=> sent.plus(Span::from_inhibit(self.inhibit)),",
+            fault: "=> sent.plus(Span::from_inhibit(self.inhibit / 2)),",
         }],
     },
     Mend {
@@ -237,8 +237,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "transfers::a_text_is_read_in_segments",
         edits: &[Edit {
             file: "crates/canopen/src/sdo/segmented.rs",
-            mended: "Ok(Segment { toggle: requested, last",
-            fault: "Ok(Segment { toggle: !requested, last",
+            mended: "*command = if requested { TOGGLE }",
+            fault: "*command = if !requested { TOGGLE }",
         }],
     },
 ];

@@ -132,7 +132,7 @@ pub fn set_erase_budget(budget: u16) {
 }
 
 /// The place of the number of tries in the lower half, with its complement in the upper one.
-pub(super) const CLOCK_TRIES: *const u32 = &raw const RETAINED.clock_tries as *const u32;
+pub(super) const CLOCK_TRIES: *const u32 = (&raw const RETAINED.clock_tries).cast::<u32>();
 
 /// Number of resets since power-on because there was no clock on OSC_IN.
 #[must_use]

@@ -75,7 +75,7 @@ const STOP_POLLS: u32 = 1_000;
 static BUFFER: [AtomicU32; 2 * WORDS] = [const { AtomicU32::new(0) }; 2 * WORDS];
 
 /// The conversions, for the self-test.
-pub(super) const CONVERSIONS: *const u32 = &raw const BUFFER as *const u32;
+pub(super) const CONVERSIONS: *const u32 = (&raw const BUFFER).cast::<u32>();
 
 /// Sums over the scans of one millisecond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

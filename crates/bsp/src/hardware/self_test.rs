@@ -55,7 +55,7 @@ const BLOCKS: [Block; 14] = [
     (CAN1::ptr().cast::<u32>().wrapping_add(6), 1),
     // VREFIN_CAL in the upper half; TS_CAL1 and TS_CAL2.
     (0x1FFF_7A28 as *const u32, 2),
-    (&raw const SEEN as *const u32, (size_of::<Seen>() / 4) as u8),
+    ((&raw const SEEN).cast::<u32>(), (size_of::<Seen>() / 4) as u8),
     (retained::CLOCK_TRIES, 1),
     // Bytes 0 to 7 of the last SSI word.
     (ssi::RECEIVED, 2),

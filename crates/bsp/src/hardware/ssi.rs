@@ -56,7 +56,7 @@ static WORD: Aligned = Aligned([const { AtomicU8::new(0) }; LONGEST as usize / 8
 struct Aligned([AtomicU8; LONGEST as usize / 8]);
 
 /// The bytes of the last word, for the self-test.
-pub(super) const RECEIVED: *const u32 = &raw const WORD as *const u32;
+pub(super) const RECEIVED: *const u32 = (&raw const WORD).cast::<u32>();
 /// The byte sent for each received byte; the output has no pin.
 static SENT: AtomicU8 = AtomicU8::new(0);
 
