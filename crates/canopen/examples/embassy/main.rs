@@ -8,6 +8,9 @@
 // The host has its own critical section.
 #[cfg(not(target_os = "none"))]
 use critical_section as _;
+// The vectors of interrupts, which cortex-m-rt demands since another example names a chip.
+#[cfg(target_os = "none")]
+use stm32f4xx_hal as _;
 
 use canopen::dictionary::{Access, Dictionary, Field, Mapping, Object, Type};
 use canopen::{Action, Application, Device, Frame, Instant, NodeId, QueueFull, Transmit, objects};
