@@ -23,6 +23,8 @@
 
 #![allow(clippy::large_const_arrays, reason = "only the compiler evaluates the rows")]
 
+#[path = "socketcand/command_line.rs"]
+mod command_line;
 mod socketcand;
 
 use std::io::{self, Write};
@@ -31,12 +33,11 @@ use std::sync::mpsc::Receiver;
 use canopen::client::sdo::{Options, Sink, Upload};
 use canopen::client::{Service, Step};
 use canopen::dictionary::{Access, Dictionary, Entry, Field, Mapping, Object, Type};
-use canopen::eds::DeviceInfo;
 use canopen::emcy::Message;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Device, Fault, Frame, Instant, Next, NodeId, Transmit, objects};
-use socketcand::{Bus, Product, run};
+use socketcand::{Bus, Product};
 
 // ------------------------------------------------------------------------------------------------- object dictionary
 
@@ -235,19 +236,5 @@ impl Product for Gateway {
 }
 
 fn main() -> io::Result<()> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    match arguments[..] {
-        ["--eds", file] => {
-            let mut sheet = String::new();
-            let device = DeviceInfo::new("none", "Gateway");
-            canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
-            std::fs::write(file, sheet)
-        }
-        [address, bus, node] => {
-            let node = node.parse().ok().and_then(NodeId::new);
-            run(Gateway::default(), Device::new(&DICTIONARY, node, Host), address, bus)
-        }
-        _ => Err(io::Error::other("usage: gateway --eds FILE | HOST:PORT BUS NODE")),
-    }
+    command_line::main("Gateway", ROWS, |node| (Gateway::default(), Device::new(&DICTIONARY, node, Host)))
 }

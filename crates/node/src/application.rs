@@ -131,7 +131,7 @@ impl Application for NodeApplication {
         show(0x1F57, 1, &status.to_le_bytes());
         self.adopt_older_choice(image);
         let mut stored = Groups::NONE;
-        for group in Group::ALL {
+        for group in Group::COMMON {
             stored.set(group, !self.stored.get(group).packed.is_empty());
         }
         self.profile.initialise(image, stored);

@@ -5,7 +5,8 @@ use profiles::communication::{SELF_TEST, SELF_TEST_KEY};
 use crate::Protocol;
 
 impl Protocol {
-    /// Shows the selected value. To be called before an upload is served.
+    /// Shows the selected value. To be called before an upload is served. `value` is a parameter, not a field: the bound of
+    /// the stack allows no call through a pointer that is stored.
     #[inline(never)]
     pub fn self_test(&mut self, value: fn(u8) -> u32) {
         self.device.show(|application, image| {

@@ -18,8 +18,6 @@ pub struct Emergency {
     pub name: String,
     /// The content of the error field.
     pub field: String,
-    /// The bit of 3000h.
-    pub flag: String,
     /// What has happened.
     pub cause: String,
     /// What to do.
@@ -38,11 +36,11 @@ pub struct Abort {
 }
 
 static EMERGENCIES: LazyLock<Vec<Emergency>> = LazyLock::new(|| {
-    let rows = rows("EMCY codes").filter_map(|[code, name, field, flag, cause, remedy]| {
+    let rows = rows("EMCY codes").filter_map(|[code, name, field, _flag, cause, remedy]| {
         let code = u16::from_str_radix(code.strip_suffix('h')?, 16).ok()?;
         let detail = field.parse().ok();
         let field = if detail.is_some() { String::new() } else { field };
-        Some(Emergency { code, detail, name, field, flag, cause, remedy })
+        Some(Emergency { code, detail, name, field, cause, remedy })
     });
     rows.collect()
 });

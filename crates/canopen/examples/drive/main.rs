@@ -9,6 +9,8 @@
 //! Standard input is the machine around the drive: `overcurrent 1` and `overcurrent 0` set and clear a fault, `local 1`
 //! takes the control away from the bus.
 
+#[path = "../socketcand/command_line.rs"]
+mod command_line;
 mod machine;
 mod motor;
 mod objects;
@@ -19,13 +21,12 @@ use std::io;
 use std::sync::mpsc::Receiver;
 
 use canopen::dictionary::Entry;
-use canopen::eds::DeviceInfo;
 use canopen::sdo::Abort;
-use canopen::{Application, Condition, Device, ErrorClass, Instant, Next, NodeId};
+use canopen::{Application, Condition, Device, ErrorClass, Instant, Next};
 use machine::State;
 use motor::{Motor, Ramp};
 use objects::{DICTIONARY, ROWS, at};
-use socketcand::{Bus, Product, run};
+use socketcand::{Bus, Product};
 
 /// Bits of the controlword.
 const NEW_SET_POINT: u16 = 1 << 4;
@@ -256,19 +257,5 @@ impl Product for Program {
 }
 
 fn main() -> io::Result<()> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    match arguments[..] {
-        ["--eds", file] => {
-            let mut sheet = String::new();
-            let device = DeviceInfo::new("none", "Drive");
-            canopen::eds::write(ROWS, &device, &mut sheet).map_err(io::Error::other)?;
-            std::fs::write(file, sheet)
-        }
-        [address, bus, node] => {
-            let node = node.parse().ok().and_then(NodeId::new);
-            run(Program, Device::new(&DICTIONARY, node, Drive::default()), address, bus)
-        }
-        _ => Err(io::Error::other("usage: drive --eds FILE | HOST:PORT BUS NODE")),
-    }
+    command_line::main("Drive", ROWS, |node| (Program, Device::new(&DICTIONARY, node, Drive::default())))
 }

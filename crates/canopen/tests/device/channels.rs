@@ -4,10 +4,11 @@ use canopen::client::sdo::{Buffer, Options, Upload};
 use canopen::client::{Service, Step};
 use canopen::dictionary::{Access, Dictionary, Group, Object, Services, Sizes, Type};
 use canopen::nmt::Command;
-use canopen::sdo::{Abort, BlockSize, Multiplexer, Request};
-use canopen::{Action, Application, Device, Frame, Instant, NodeId, Part, objects};
+use canopen::sdo::{BlockSize, Multiplexer, Request};
+use canopen::{Action, Device, Frame, Instant, NodeId, objects};
 
 use crate::exchange;
+use crate::service_device::Loader;
 use crate::types::Sent;
 
 const ID: u8 = 5;
@@ -27,32 +28,14 @@ const ROWS: &[Object] = canopen::rows!(
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-#[derive(Default)]
-struct Content(Vec<u8>);
-
-impl Application for Content {
-    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
-        Ok(&self.0)
-    }
-
-    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
-        match part {
-            Part::Begin(_) => self.0.clear(),
-            Part::Data(_, bytes) => self.0.extend_from_slice(bytes),
-            Part::End(_) => (),
-        }
-        Ok(())
-    }
-}
-
-type Node = canopen::device!(Content, ROWS);
+type Node = canopen::device!(Loader, ROWS);
 
 /// The channels of the device: the CAN-IDs of request and response.
 const DEFAULT: (u16, u16) = (0x605, 0x585);
 const SECOND: (u16, u16) = (0x6A0, 0x6B0);
 
 fn node() -> Node {
-    let mut node = Device::new(&DICTIONARY, NodeId::new(ID), Content::default());
+    let mut node = Device::new(&DICTIONARY, NodeId::new(ID), Loader::default());
     let _ = node.start(Instant(0), &mut Sent::default());
     node
 }
@@ -306,7 +289,7 @@ fn the_application_reads_another_node_by_its_client_object() {
     enable(&mut master, 0x1280, (0x609, 0x589));
     let channel = master.sdo_client(1).unwrap();
     assert_eq!((channel.to_server.get(), channel.from_server.get()), (0x609, 0x589));
-    let mut other: Node = Device::new(&DICTIONARY, NodeId::new(9), Content::default());
+    let mut other: Node = Device::new(&DICTIONARY, NodeId::new(9), Loader::default());
     let _ = other.start(Instant(0), &mut Sent::default());
     let mut memory = [0; 64];
     let options = Options { block_size: BlockSize::MAX, ..Options::default() };
@@ -343,7 +326,7 @@ impl canopen::Transmit for Full {
 /// A node sends nothing before its boot-up message.
 #[test]
 fn a_client_waits_for_the_boot_up_message() {
-    let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Content::default());
+    let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Loader::default());
     let _ = node.start(Instant(0), &mut Full);
     node.show(|_, image| {
         DICTIONARY.field(0x1280, 1).set_u32(image, 0x609);

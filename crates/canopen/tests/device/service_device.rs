@@ -27,7 +27,7 @@ static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// An application that keeps a domain.
 #[derive(Default)]
-struct Loader(Vec<u8>);
+pub(super) struct Loader(pub(super) Vec<u8>);
 
 impl Application for Loader {
     fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
