@@ -115,7 +115,8 @@ impl Application for Program {
 
     fn initialise(&mut self, image: &mut [u8]) {
         HARDWARE.set(image, BOARD.name.as_bytes());
-        let identity = [product::VENDOR_ID, self.product, product::REVISION, self.serial_number];
+        let identity =
+            [profiles::product::VENDOR_ID, self.product, profiles::product::REVISION, self.serial_number];
         for (field, value) in IDENTITY.into_iter().zip(identity) {
             field.store(image, value.to_le_bytes());
         }

@@ -122,9 +122,9 @@ impl Application for NodeApplication {
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
         show(0x1009, 0, setup.hardware_version.as_bytes());
         show(0x100A, 0, setup.software_version.as_bytes());
-        show(0x1018, 1, &product::VENDOR_ID.to_le_bytes());
+        show(0x1018, 1, &profiles::product::VENDOR_ID.to_le_bytes());
         show(0x1018, 2, &setup.personality.product_code().to_le_bytes());
-        show(0x1018, 3, &product::REVISION.to_le_bytes());
+        show(0x1018, 3, &profiles::product::REVISION.to_le_bytes());
         show(0x1018, 4, &setup.serial_number.to_le_bytes());
         show(0x1F56, 1, &setup.program_id.to_le_bytes());
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());

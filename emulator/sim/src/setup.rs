@@ -29,7 +29,7 @@ pub fn bits_per_second(kbit: u16) -> u32 {
 pub fn world(options: &Options) -> Result<World> {
     let firmware = Image::load(&options.firmware)?;
     let bootloader = options.bootloader.as_deref().map(Image::load).transpose()?;
-    let header = bootloader.is_some().then(|| sign::product::development_image(&firmware.elf));
+    let header = bootloader.is_some().then(|| programmer::sign::product::development_image(&firmware.elf));
     let header = header.transpose()?.map(|image| image.header.encode());
     let images = Rc::new(Images { firmware, header, bootloader });
     let boards = options.nodes.iter().map(|node| board(node, options, &images));

@@ -1,9 +1,9 @@
 //! A supply that falls and rises, with the brown-out reset off and at each of its levels.
 
-use bringup_emulated::Probe;
 use canbus::Time;
-use protect::OptionBytes;
+use programmer::protect::OptionBytes;
 use sim::world::World;
+use workbench::bringup::Probe;
 
 use crate::encoder::stimulate;
 use crate::support::{Master, SECOND, read, running, write};
@@ -28,7 +28,7 @@ fn save(world: &mut World, master: &Master) -> Vec<u8> {
 
 fn set_brown_out_level(world: &mut World, level: u8) {
     let options = OptionBytes::FACTORY.with_brown_out_level(level);
-    protect::program(&mut Probe(world), options).unwrap();
+    programmer::protect::program(&mut Probe(world), options).unwrap();
     world.run_until(world.now() + SECOND);
 }
 

@@ -7,8 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const CRATES: [&str; 6] =
-    ["crates/node", "crates/profiles", "crates/product", "crates/storage", "crates/update", "firmware"];
+const CRATES: [&str; 6] = ["crates/node", "crates/profiles", "crates/storage", "crates/update", "firmware"];
 /// Crates in which no two files beside `lib.rs` depend on each other either.
 const LAYERED: [&str; 1] = ["crates/canopen"];
 

@@ -68,7 +68,7 @@ const fn fact(sub: u8, name: &'static str, kind: Type) -> Object {
 /// as in 1F56h; 0 is none.
 pub const PROGRAM_STATE_ROWS: &[Object] = &[
     Object::highest(PROGRAM_STATE, 5, "Program state"),
-    fact(1, "Board", Type::Unsigned32).value(product::BOARD as i64),
+    fact(1, "Board", Type::Unsigned32).value(crate::product::BOARD as i64),
     fact(2, "Security counter", Type::Unsigned32),
     fact(3, "Key generation", Type::Unsigned8),
     fact(4, "Downloaded program", Type::Unsigned32),

@@ -11,8 +11,8 @@ use host_tests::thorough::either;
 use host_tests::watch::expects;
 use monitor::Rule;
 use nodectl::cli::Cli;
+use programmer::sign::image::Image;
 use serde_json::{Value, json};
-use sign::image::Image;
 use sim::world::World;
 
 use super::bench::{Bench, VERSION_B, signed, version_a, version_b};

@@ -13,7 +13,7 @@ mod trial;
 
 use bsp::sectors::FLASH;
 use bsp::update_layout::LAYOUT;
-use budget::{Budget, Compiler};
+use callgraph::budget::{Budget, Compiler};
 use canbus::Time;
 use host_tests::thorough::either;
 use host_tests::watch::expects;

@@ -112,8 +112,8 @@ fn self_test(bench: &mut Bench<'_>) -> Result<()> {
 }
 
 fn option_bytes(bench: &mut Bench<'_>) -> Result<()> {
-    let options = protect::OptionBytes::from_register(bench.word(chip::FLASH_OPTCR)?);
-    let is_open = options.read_out() == protect::ReadOut::Open && !options.is_proprietary();
+    let options = programmer::protect::OptionBytes::from_register(bench.word(chip::FLASH_OPTCR)?);
+    let is_open = options.read_out() == programmer::protect::ReadOut::Open && !options.is_proprietary();
     bench.check(
         "option bytes",
         options,

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::Duration as StdDuration;
 
+use crate::page::{FromPage, Hub, PageId};
 use canopen::{Duration, Frame, Instant, NodeId};
-use page::{FromPage, Hub, PageId};
 use serde_json::Value as Json;
 
 use super::bus_time::BusTime;
