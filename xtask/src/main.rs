@@ -1,5 +1,6 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
+mod apt;
 mod bench;
 mod bringup;
 mod callgraph;

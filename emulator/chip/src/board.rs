@@ -3,7 +3,8 @@
 pub use crate::plant::FrontEnd;
 pub use crate::spi::SsiFormat;
 
-use crate::plant::BUTTONS;
+/// Number of buttons on the board.
+pub const BUTTONS: usize = 2;
 
 /// A button of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

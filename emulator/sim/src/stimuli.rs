@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use canbus::Time;
-use chip::plant::{BUTTONS, Fault, FaultSwitch, Motion, Plant, Push, Signal};
+use chip::BUTTONS;
+use chip::plant::{Fault, FaultSwitch, Motion, Plant, Push, Signal};
 use serde::Serialize;
 
 use crate::cli::{BOARD_NUMBERS, board_number};

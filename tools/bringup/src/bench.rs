@@ -10,8 +10,25 @@ use nodectl::sdo;
 use crate::chip::Chip;
 use crate::desk::{Action, Desk};
 use crate::report::{Check, Result as Outcome};
-use crate::run::Effort;
 use crate::values;
+
+/// How long the steps measure.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Seconds of measurements over time.
+    pub seconds: u64,
+    /// Frames at each bit rate.
+    pub frames: u32,
+    /// Repetitions of whatever has to work each time.
+    pub times: u32,
+}
+
+impl Effort {
+    /// That of a real board.
+    pub const FULL: Effort = Effort { seconds: 60, frames: 10_000, times: 20 };
+    /// A first look.
+    pub const SHORT: Effort = Effort { seconds: 5, frames: 60, times: 3 };
+}
 
 /// The object with the values of the board.
 pub(crate) const SELF_TEST: u16 = 0x2005;

@@ -11,10 +11,10 @@ mod table;
 
 use canbus::Time;
 
-use crate::board::Board;
+use crate::board::{BUTTONS, Board};
 
 use button::Button;
-pub use button::{BUTTONS, Push, PushError};
+pub use button::{Push, PushError};
 pub use fault::{Fault, FaultError, FaultKind, FaultSwitch};
 pub use front_end::{FrontEnd, Rails};
 pub use shaft::Motion;

@@ -2,9 +2,9 @@
 
 use canbus::{Monitor, Time};
 
+use super::status::Status;
+use super::transmit::Transmitter;
 use super::{ABOM, AWUM, BxCan, INRQ, MCR_RESET, MCR_WRITABLE, RESET, SLEEP};
-use crate::can::status::Status;
-use crate::can::transmit::Transmitter;
 use crate::register::{bit, flag};
 
 /// The mode that CAN_MSR acknowledges.

@@ -8,6 +8,7 @@ mod bus_time;
 mod jobs;
 mod live;
 mod nodes;
+mod order;
 mod pages;
 mod port;
 mod pump;
@@ -26,7 +27,8 @@ use std::thread;
 use clap::Args;
 use serde::Serialize;
 
-use self::pump::{Order, Pump, Setup};
+use self::order::Order;
+use self::pump::{Pump, Setup};
 use super::{Failure, Options, Output};
 use crate::bus::Address;
 

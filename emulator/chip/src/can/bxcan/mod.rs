@@ -1,17 +1,22 @@
 //! One bxCAN: its registers, clock and interrupt lines.
 
+mod fifo;
+mod filter;
 mod loop_back;
+mod mailbox;
 mod modes;
+mod status;
+mod transmit;
 
 use canbus::{BitTiming, ErrorState, Frame, Monitor, Time};
 
+use self::fifo::Fifo;
+use self::filter::FilterBanks;
 use self::loop_back::Loop;
+use self::mailbox::Registers;
 use self::modes::Mode;
-use super::fifo::Fifo;
-use super::filter::FilterBanks;
-use super::mailbox::Registers;
-use super::status::Status;
-use super::transmit::Transmitter;
+use self::status::Status;
+use self::transmit::Transmitter;
 use crate::register::{bit, field};
 
 const MCR: u32 = 0x00;

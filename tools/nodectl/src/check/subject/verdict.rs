@@ -67,16 +67,16 @@ impl From<BusError> for Stop {
 }
 
 /// The outcome of a device that breaks the rule.
-pub(super) fn fail(expected: impl ToString, seen: impl ToString) -> Stop {
+pub(in crate::check) fn fail(expected: impl ToString, seen: impl ToString) -> Stop {
     Stop::Failed(Deviation { expected: expected.to_string(), seen: seen.to_string() })
 }
 
 /// The outcome of a rule that cannot be tried.
-pub(super) fn skip(reason: impl ToString) -> Stop {
+pub(in crate::check) fn skip(reason: impl ToString) -> Stop {
     Stop::Skipped(reason.to_string())
 }
 
 /// Fails unless a condition holds.
-pub(super) fn ensure(holds: bool, expected: impl ToString, seen: impl ToString) -> Outcome {
+pub(in crate::check) fn ensure(holds: bool, expected: impl ToString, seen: impl ToString) -> Outcome {
     if holds { Ok(()) } else { Err(fail(expected, seen)) }
 }
