@@ -16,7 +16,7 @@ mod probe;
 
 pub use adapter::{Adapter, Shared};
 pub use desk::{EmulatedDesk, Mistake};
-pub use programmer::probe::Probe;
+pub use probe::Probe;
 
 /// The images of a development board in this directory, on one board with this personality.
 ///

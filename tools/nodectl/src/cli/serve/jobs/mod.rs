@@ -29,7 +29,7 @@ use super::request::{What, Whom};
 use super::schedule::Lane;
 use super::stimuli;
 use super::turn::Turn;
-use crate::cli::store::Order;
+use crate::cli::store;
 use crate::cli::{Failure, Options, Output, Session};
 use crate::sdo::Channel;
 use crate::trace::Knowledge;
@@ -226,8 +226,8 @@ pub(super) fn task(what: What, means: Means) -> Result<Task, String> {
             let node = if let Whom::Node(node) = node { Some(node.0) } else { None };
             with(Lane::Nothing, overview::nmt(node, command))
         }
-        What::Save { node, group } => of(node, overview::store(node.0, Order::Save, group)),
-        What::Restore { node, group } => of(node, overview::store(node.0, Order::Restore, group)),
+        What::Save { node, group } => of(node, overview::store(node.0, store::Order::Save, group)),
+        What::Restore { node, group } => of(node, overview::store(node.0, store::Order::Restore, group)),
         What::Signals { node } => of(node, survey(node.0)),
         What::Dictionary { node } => of(node, objects::dictionary(node.0)),
         What::Read { node, objects } => {

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::Duration as StdDuration;
 
-use canopen::{Duration, Frame, Instant, NodeId};
+use canopen::{Duration, Instant, NodeId};
 use serde_json::Value as Json;
 
 use super::bus_time::BusTime;
-use super::jobs::{Job, Learned};
+use super::jobs::Job;
 use super::live::Live;
 use super::nodes::Nodes;
 use super::order::{Order, Refusal};
