@@ -172,6 +172,23 @@ def test_paths_exist(document: Path):
     assert not [path for path in named if not (ROOT / path).exists() and not EXAMPLE.search(path)]
 
 
+def test_named_tests_exist():
+    """A name of four words or more in code is that of a function or of another item; `...` stands for a part of it."""
+    folders = ["bench", "bootloader", "crates", "emulator", "firmware", "host-tests", "tools", "xtask"]
+    found = [file for folder in folders for file in (ROOT / folder).rglob("*.[rp][sy]")]
+    files = [file for file in found if "target" not in file.parts]
+    names = set(re.findall(r"\w+", "\n".join(file.read_text(encoding="utf-8", errors="replace") for file in files)))
+    missing = []
+    for document in DOCUMENTS:
+        text = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        for code in re.findall(r"`([^`\n]+)`", text):
+            for name in re.findall(r"(?:^|::| )((?:\.\.\.)?[a-z]+(?:_[a-z0-9]+){3,}(?:_?\.\.\.)?)(?= |$)", code):
+                part = name.strip("._")
+                exists = part in names or (part != name and any(part in known for known in names))
+                missing += [] if exists else [(document.name, code)]
+    assert not missing
+
+
 def anchors(text: str) -> set[str]:
     """The anchors of the headings, as GitHub makes them."""
     text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
