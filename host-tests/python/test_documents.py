@@ -217,6 +217,16 @@ def test_links_lead_to_files_and_headings(document: Path):
     assert not broken
 
 
+def test_the_site_has_every_document():
+    """`cargo xtask docs` makes pages of the documents in SUMMARY.md, once each, and of those that they link to."""
+    summary = ROOT / "docs" / "SUMMARY.md"
+    listed = [(summary.parent / link).resolve() for link in links(summary)]
+    assert len(listed) == len(set(listed))
+    assert set(DOCUMENTS) <= {*listed, summary}
+    linked = {(document.parent / link.partition("#")[0]).resolve() for document in listed for link in links(document)}
+    assert {file for file in linked if file.suffix == ".md"} <= {*listed, summary}
+
+
 def test_drawings_are_shown_and_described():
     shown = {(document.parent / link).resolve() for document in DOCUMENTS for link in links(document)}
     for drawing in sorted((ROOT / "docs" / "drawings").glob("*.svg")):
