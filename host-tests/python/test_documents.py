@@ -16,6 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import error_budget
+import picture_sources
 import pytest
 from simulator import ONCE_MORE, PATIENCE, Simulator
 
@@ -235,6 +236,21 @@ def test_drawings_are_shown_and_described():
         assert {"title", "desc", "style"} <= described, drawing.name
         assert "prefers-color-scheme: dark" in drawing.read_text(encoding="utf-8"), drawing.name
         assert drawing in shown, drawing.name
+
+
+def test_pictures_are_younger_than_what_they_show():
+    assert picture_sources.stated() == picture_sources.hashes(), "cargo xtask pictures takes them again"
+
+
+def test_the_drawing_of_the_architecture_has_the_tasks_and_the_sectors():
+    drawing = ElementTree.parse(ROOT / "docs" / "architecture.svg").getroot()
+    texts = ["".join(element.itertext()) for element in drawing.iter() if element.tag.endswith("}text")]
+    drawn = {(name, priority) for name, priority in zip(texts, texts[1:]) if priority.startswith("priority ")}
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d) \| (\w+) \|", page.split("## Tasks")[1].split("\n## ")[0], re.MULTILINE)
+    assert drawn == {(name, f"priority {priority}") for priority, name in rows if name != "idle"}
+    update = (ROOT / "docs" / "update.md").read_text(encoding="utf-8").split("## Flash")[1].split("\n## ")[0]
+    assert set(re.findall(r"\bS\d", " ".join(texts))) == set(re.findall(r"\bS\d", update))
 
 
 def test_the_error_budget_is_that_of_its_circuits():
