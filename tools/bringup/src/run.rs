@@ -20,7 +20,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// That of a real board.
+    /// The bus of a real board.
     pub const FULL: Effort = Effort { seconds: 60, frames: 10_000, times: 20 };
     /// A first look.
     pub const SHORT: Effort = Effort { seconds: 5, frames: 60, times: 3 };

@@ -1,4 +1,4 @@
-//! The error texts for bad input, as in the table of docs/nodectl-errors.md. `UPDATE_TABLE=1` writes the table anew.
+//! The error texts for bad input, as in the table of docs/nodectl-errors.md. `UPDATE_TABLE=1` writes the table.
 
 use assert_cmd::Command;
 use clap::Parser;
@@ -116,7 +116,7 @@ fn refused(line: &[&str]) -> String {
 }
 
 #[test]
-fn every_bad_input_is_told_what_is_wrong_with_it() {
+fn every_bad_input_has_an_error_text() {
     let mut page = HEADER.to_owned();
     for line in REFUSED {
         page += &row(line, 2, &refused(line));
