@@ -37,6 +37,11 @@ pub(crate) fn build() -> Result<()> {
         .arg("--dest-dir")
         .arg(&site)
         .arg(&book))?;
+    // mdbook calls the page of a README `index.html`, and links to it `README.html`.
+    for readme in documents.iter().filter(|file| file.ends_with("README.md")) {
+        let page = site.join(readme).with_extension("html");
+        fs::copy(page.with_file_name("index.html"), page)?;
+    }
     println!("{}", site.join("index.html").display());
     println!("{}", target_dir().join("doc/canopen/index.html").display());
     Ok(())

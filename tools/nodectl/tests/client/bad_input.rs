@@ -103,7 +103,8 @@ fn row(line: &[&str], code: u8, text: &str) -> String {
         .iter()
         .map(|word| if word.contains(' ') { format!("\"{word}\"") } else { (*word).to_owned() })
         .collect();
-    format!("| `{}` | {code} | {} |\n", cell(&words.join(" ")), cell(text))
+    // `<` begins a tag in Markdown.
+    format!("| `{}` | {code} | {} |\n", cell(&words.join(" ")), cell(text).replace('<', "\\<"))
 }
 
 /// The reason that the parser gives, which is its first line.
