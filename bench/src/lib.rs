@@ -2,7 +2,7 @@
 //!
 //! The host is the bus and the client. Each request is a command and a frame in registers, which the emulated machine
 //! has in place of peripherals. The count runs from the frame in the node's own type to the frame given to the driver.
-//! It is stopped while the driver has a frame, so the cost of the driver is the same for all nodes.
+//! The counter is stopped while the driver has a frame, so the cost of the driver is the same for all nodes.
 #![no_std]
 
 mod domain;

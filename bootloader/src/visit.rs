@@ -18,7 +18,7 @@ const LOOK: Duration = Duration::from_millis(2);
 pub(crate) struct Visit(Guest);
 
 impl Visit {
-    /// Starts: goes on the bus, or listens.
+    /// Starts: joins the bus, or listens.
     pub(crate) fn begin(identity: Identity, session: &mut Session, out: &mut Outbox) -> Visit {
         let (guest, step) = Guest::new(identity.timing);
         session.go(step, out);

@@ -82,7 +82,7 @@ fn make(place: &'static mut MaybeUninit<Protocol>, setup: &Setup) -> &'static mu
     protocol
 }
 
-/// May erase pages, which stops the core for half a second, so it is called before the node goes on the bus.
+/// May erase pages, which stops the core for half a second, so it is called before the node joins the bus.
 fn prepare(view: View<ParameterFlash>) -> Option<ParameterMemory<ParameterFlash>> {
     ParameterMemory::prepare(view, EraseBudget::new(retained::erase_budget()))
         .inspect(|memory| retained::set_erase_budget(memory.budget().word()))

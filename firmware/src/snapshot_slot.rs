@@ -17,7 +17,7 @@ impl SnapshotSlot {
         &mut self.snapshot
     }
 
-    /// Copies a snapshot that has not been taken yet; false if there is none.
+    /// Copies a snapshot that has not been taken yet; false without a new one.
     pub(crate) fn take(&mut self, to: &mut Snapshot) -> bool {
         if self.is_new {
             *to = self.snapshot;

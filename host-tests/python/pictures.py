@@ -14,6 +14,7 @@ import time
 from io import BytesIO
 from pathlib import Path
 
+import picture_sources
 import pyte
 from page import Page, Server, browser, size
 from PIL import Image
@@ -162,6 +163,7 @@ def main() -> None:
         server.stop()
         simulator.process.kill()
         take_terminal(driver)
+        picture_sources.write()
     finally:
         driver.quit()
         server.stop()

@@ -62,7 +62,7 @@ def ascending(node: canopen.RemoteNode) -> None:
         entries = [item] if isinstance(item, canopen.objectdictionary.ODVariable) else [item[sub] for sub in sorted(item)]
         for entry in entries:
             if entry.value is not None and entry.writable:
-                # PDOs have steps of their own (CiA 301, 7.5.2.36), but for their event timers.
+                # PDOs have steps of their own (CiA 301, 7.5.2.36), except for their event timers.
                 if 0x1400 <= index < 0x1C00 and (index >= 0x1A00 or entry.subindex != 5):
                     continue
                 node.sdo.download(entry.index, entry.subindex, entry.encode_raw(entry.value))

@@ -16,6 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import error_budget
+import picture_sources
 import pytest
 from simulator import ONCE_MORE, PATIENCE, Simulator
 
@@ -172,6 +173,23 @@ def test_paths_exist(document: Path):
     assert not [path for path in named if not (ROOT / path).exists() and not EXAMPLE.search(path)]
 
 
+def test_named_tests_exist():
+    """A name of four words or more in code is that of a function or of another item; `...` stands for a part of it."""
+    folders = ["bench", "bootloader", "crates", "emulator", "firmware", "host-tests", "tools", "xtask"]
+    found = [file for folder in folders for file in (ROOT / folder).rglob("*.[rp][sy]")]
+    files = [file for file in found if "target" not in file.parts]
+    names = set(re.findall(r"\w+", "\n".join(file.read_text(encoding="utf-8", errors="replace") for file in files)))
+    missing = []
+    for document in DOCUMENTS:
+        text = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        for code in re.findall(r"`([^`\n]+)`", text):
+            for name in re.findall(r"(?:^|::| )((?:\.\.\.)?[a-z]+(?:_[a-z0-9]+){3,}(?:_?\.\.\.)?)(?= |$)", code):
+                part = name.strip("._")
+                exists = part in names or (part != name and any(part in known for known in names))
+                missing += [] if exists else [(document.name, code)]
+    assert not missing
+
+
 def anchors(text: str) -> set[str]:
     """The anchors of the headings, as GitHub makes them."""
     text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
@@ -200,6 +218,16 @@ def test_links_lead_to_files_and_headings(document: Path):
     assert not broken
 
 
+def test_the_site_has_every_document():
+    """`cargo xtask docs` makes pages of the documents in SUMMARY.md, once each, and of those that they link to."""
+    summary = ROOT / "docs" / "SUMMARY.md"
+    listed = [(summary.parent / link).resolve() for link in links(summary)]
+    assert len(listed) == len(set(listed))
+    assert set(DOCUMENTS) <= {*listed, summary}
+    linked = {(document.parent / link.partition("#")[0]).resolve() for document in listed for link in links(document)}
+    assert {file for file in linked if file.suffix == ".md"} <= {*listed, summary}
+
+
 def test_drawings_are_shown_and_described():
     shown = {(document.parent / link).resolve() for document in DOCUMENTS for link in links(document)}
     for drawing in sorted((ROOT / "docs" / "drawings").glob("*.svg")):
@@ -208,6 +236,21 @@ def test_drawings_are_shown_and_described():
         assert {"title", "desc", "style"} <= described, drawing.name
         assert "prefers-color-scheme: dark" in drawing.read_text(encoding="utf-8"), drawing.name
         assert drawing in shown, drawing.name
+
+
+def test_pictures_are_younger_than_what_they_show():
+    assert picture_sources.stated() == picture_sources.hashes(), "cargo xtask pictures takes them again"
+
+
+def test_the_drawing_of_the_architecture_has_the_tasks_and_the_sectors():
+    drawing = ElementTree.parse(ROOT / "docs" / "architecture.svg").getroot()
+    texts = ["".join(element.itertext()) for element in drawing.iter() if element.tag.endswith("}text")]
+    drawn = {(name, priority) for name, priority in zip(texts, texts[1:]) if priority.startswith("priority ")}
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d) \| (\w+) \|", page.split("## Tasks")[1].split("\n## ")[0], re.MULTILINE)
+    assert drawn == {(name, f"priority {priority}") for priority, name in rows if name != "idle"}
+    update = (ROOT / "docs" / "update.md").read_text(encoding="utf-8").split("## Flash")[1].split("\n## ")[0]
+    assert set(re.findall(r"\bS\d", " ".join(texts))) == set(re.findall(r"\bS\d", update))
 
 
 def test_the_error_budget_is_that_of_its_circuits():

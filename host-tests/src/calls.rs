@@ -25,7 +25,7 @@ pub struct Verdict {
 /// Checks a log against the transitions. Every transition is reported once and in order, or is covered by a later full
 /// state. A word of the log was formed at most `lag` microseconds after the latest transition that it contains.
 ///
-/// Of several interpretations of the log, the one with the fewest full states counts.
+/// Among several interpretations of the log, the one with the fewest full states counts.
 ///
 /// # Errors
 /// The first word without an explanation, or the number of transitions that are missing at the end of the log.
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_told_once_and_in_order_is_fine() {
+    fn events_reported_once_and_in_order_are_accepted() {
         let log = HAPPENED.map(later);
         let expected = Verdict { told: 4, covered: 0, full_states: 0 };
         assert_eq!(verify(&HAPPENED, &log, 100), Ok(expected));
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_state_covers_what_was_before() {
+    fn a_full_state_covers_the_events_before_it() {
         let log = [later(HAPPENED[0]), at(200, 0, false), at(200, 1, false)];
         let expected = Verdict { told: 1, covered: 3, full_states: 1 };
         assert_eq!(verify(&HAPPENED, &log, 10), Ok(expected));

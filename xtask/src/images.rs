@@ -26,7 +26,7 @@ pub(crate) const CHIP: &str = "stm32f446";
 const OTHER_BOARDS: [&str; 2] = ["weact-f405rg", "black-f407ve"];
 
 /// The other chips. The second is the first with Ethernet and a camera, which the images do not use. So the first
-/// stands for both in quick tests.
+/// represents both in quick tests.
 pub(crate) const OTHER_CHIPS: [&str; 2] = ["stm32f405", "stm32f407"];
 
 /// Compiles the firmware and the bootloader for development. Returns their directory.

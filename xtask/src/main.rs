@@ -26,6 +26,7 @@ mod reproducible;
 mod sbom;
 mod setup;
 mod sim;
+mod site;
 mod target;
 mod test;
 mod timing;
@@ -79,10 +80,12 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
     },
-    /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
+    /// Write eds/*.eds, docs/object-dictionary.md and docs/data-sheet.md from the dictionary tables
     Eds,
     /// Write docs/plots/*.svg and the tables of docs/measuring.md from the measurement chain
     Plots,
+    /// Build the documents as one site with search, and the documentation of the library beside it
+    Docs,
     /// Take the pictures of the page and of the simulator's screen for docs/page.md and README
     Pictures,
     /// Make signing keys and sign images for the field update (docs/update.md; `cargo xtask sign --help`)
@@ -164,6 +167,7 @@ fn run(command: Command) -> Result<()> {
         Command::FaultInjection { flags } => fault_injection::try_all(&flags),
         Command::Eds => eds::write(),
         Command::Plots => plots::write(),
+        Command::Docs => site::build(),
         Command::Pictures => pictures::take(),
         Command::Sign { arguments } => own_tool::run("sign", &arguments),
         Command::Protect { arguments } => own_tool::run("protect", &arguments),

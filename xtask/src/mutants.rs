@@ -14,10 +14,10 @@ use crate::tools;
 
 /// A crate that is mutated.
 struct Mutated {
-    /// What the command calls it.
+    /// Its name in the command.
     name: &'static str,
     package: &'static str,
-    /// What cargo builds and runs for it, beside the package. No examples of the documentation: building them takes longer than
+    /// Arguments of cargo, beside the package. No examples of the documentation: building them takes longer than
     /// running all tests.
     tests: &'static [&'static str],
 }

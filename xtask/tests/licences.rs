@@ -91,7 +91,7 @@ fn an_expression_is_permissive_when_one_of_its_choices_is() {
 }
 
 #[test]
-fn what_is_shipped_asks_for_no_more_than_the_readme_says() {
+fn the_licences_of_the_products_are_those_of_the_readme() {
     let readme = include_str!("../../README.md");
     let stated = readme.split_once("## Licences").expect("a section about licences").1;
     let mut seen = BTreeSet::new();

@@ -104,7 +104,7 @@ impl Machine {
 }
 
 #[test]
-fn whoever_is_not_root_on_debian_is_told_one_command_and_nothing_is_built() {
+fn a_user_without_root_on_debian_gets_one_command_and_no_build() {
     let machine = Machine::debian("debian").closed();
     let command = "sudo apt-get install -y rustc-web rust-web-src cargo-web rust-web-clippy python3-venv tshark \
                    chromium chromium-driver";
@@ -148,7 +148,7 @@ fn with_a_python_that_makes_environments_the_emulator_s_tools_need_no_package() 
 }
 
 #[test]
-fn other_systems_are_told_in_their_words() {
+fn other_systems_get_their_own_commands() {
     for (manager, command) in [
         ("dnf", "sudo dnf install -y python3 wireshark-cli chromium chromedriver"),
         ("pacman", "sudo pacman -S --needed --noconfirm python wireshark-cli chromium"),
@@ -173,7 +173,7 @@ fn without_a_package_manager_the_packages_are_named() {
 }
 
 #[test]
-fn who_has_no_probe_rs_is_told_how_to_get_it_and_nothing_is_built() {
+fn without_probe_rs_the_install_command_is_printed_and_no_build_starts() {
     for machine in [Machine::new("no-probe-rs").with("dnf", WORKS), Machine::new("no-manager")] {
         let output = machine.xtask(&["flash", "--development"]);
         let says = String::from_utf8(output.stderr).unwrap();

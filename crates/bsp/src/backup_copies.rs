@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_is_found_and_goes_on() {
+    fn the_latest_copy_is_found_and_continued() {
         for writes in 1..=5 {
             let slots = written(writes);
             let (mut copies, found) = open(&slots);

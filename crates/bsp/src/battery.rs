@@ -34,7 +34,7 @@ mod tests {
     use crate::backup_copies::CAPACITY;
 
     #[test]
-    fn only_a_loss_of_power_tells_something() {
+    fn a_report_is_made_after_a_loss_of_power_only() {
         let kept = BackupState::Intact([0; CAPACITY]);
         for cause in [ResetCause::PowerOn, ResetCause::BrownOut] {
             assert_eq!(Battery::after(cause, &kept), Battery::Holds);

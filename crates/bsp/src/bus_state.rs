@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_told_once() {
+    fn a_change_is_reported_once() {
         let mut watch = BusWatch::default();
         assert_eq!(watch.change(BusState::Active), None);
         assert_eq!(watch.change(BusState::Off), Some((BusState::Active, BusState::Off)));

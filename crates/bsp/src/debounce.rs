@@ -1,7 +1,7 @@
 //! Debouncing of contacts.
 
 /// Number of consecutive samples that must agree before the input changes. At 1 kHz this is 10 ms: contacts bounce for
-/// less, and nobody presses a button for less.
+/// less, and no press of a button is shorter.
 const SAMPLES: u8 = 10;
 
 /// One input, sampled at a constant rate.

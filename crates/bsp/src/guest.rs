@@ -8,7 +8,7 @@
 //! | staying | yes | never |
 //!
 //! A guest without a stored rate sends nothing before another node does: a bus may be silent because its nodes wait. A
-//! sender whose frame nobody acknowledges repeats the frame and soon becomes error passive; from then on the guest
+//! sender without an acknowledge repeats the frame and soon becomes error passive; from then on the guest
 //! receives the frame too.
 
 use canopen::{Duration, Instant};
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_rate_it_waits_at_250_kbit_for_somebody_to_speak() {
+    fn without_a_stored_rate_the_guest_listens_at_250_kbit() {
         let (mut guest, step) = Guest::new(None);
         assert_eq!(step, Step::Listen(at(250)));
         for seconds in 0..1_000 {

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_note_comes_back() {
+    fn every_note_survives_the_handover() {
         for kbit in [10, 20, 50, 125, 250, 500, 800, 1000] {
             for (node_id, stay) in [(None, false), (Some(1), true), (Some(127), false)] {
                 let note = Handover { node_id, timing: BitTiming::of(kbit).unwrap(), stay };
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn what_ram_holds_after_power_up_is_no_note() {
+    fn random_ram_after_power_up_is_no_note() {
         for words in [[0, 0], [u32::MAX; 2], [0, u32::MAX], [u32::MAX, 0], [0xA5A5_A5A5; 2]] {
             assert_eq!(Handover::open(&words), None);
         }

@@ -36,7 +36,7 @@ impl Progress {
 mod tests {
     use super::*;
 
-    /// All possible observations in a round in which the copies, and the conversions, are late by so many requests.
+    /// All possible observations in a round in which the copies, and the conversions, are late by this number of requests.
     fn seen(copies_behind: usize, conversions_behind: usize) -> impl Iterator<Item = Progress> {
         (0..ROUND).flat_map(move |scan| {
             (0..=CHANNELS).flat_map(move |converted| {

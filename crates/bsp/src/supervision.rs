@@ -51,7 +51,7 @@ mod tests {
     const PARTS: [Part; 4] = [Part::Sampling, Part::Process, Part::Services, Part::Storage];
 
     #[test]
-    fn without_one_of_them_nobody_feeds() {
+    fn the_watchdog_is_not_fed_while_a_task_is_silent() {
         for silent in PARTS {
             let supervision = Supervision::new();
             let others = PARTS.into_iter().filter(|part| *part != silent);

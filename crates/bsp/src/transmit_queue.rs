@@ -133,7 +133,7 @@ impl TransmitQueue {
         self.boot_up = BootUp::Sent;
     }
 
-    /// Adds a frame that comes back from a mailbox. The frame was queued before all others of its identifier, so it
+    /// Adds a frame returned from a mailbox. The frame was queued before all others of its identifier, so it
     /// goes in front of them. The mailboxes hold at most one frame of an identifier, so at most one such frame waits;
     /// it counts as an event.
     fn push_first(&mut self, frame: Frame) -> Result<(), QueueFull> {
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_back_from_a_mailbox_is_not_lost_to_a_newer_one() {
+    fn a_frame_returned_from_a_mailbox_is_not_replaced_by_a_newer_one() {
         let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
         queue.send_state(frame(0x701, 1)).unwrap();
         queue.pump(&mut bus);
@@ -452,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn room_tells_what_can_be_sent() {
+    fn room_is_the_number_of_frames_that_can_be_sent() {
         let mut queue = TransmitQueue::new();
         while queue.room() > 0 {
             queue.send(frame(1, 0)).unwrap();

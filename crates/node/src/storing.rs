@@ -33,8 +33,8 @@ impl Protocol {
         self.device.application().configured.encode()
     }
 
-    /// Takes the job that `Action::Store` announced, with the values of this moment. `false` if there is none. The
-    /// values are only copied: packing them takes half a millisecond, and nobody should wait for the protocol that
+    /// Takes the job that `Action::Store` announced, with the values of this moment. `false` without a job. The
+    /// values are only copied: packing them takes half a millisecond, and no task should wait for the protocol that
     /// long.
     ///
     /// Values that the measurement determines, such as the offset of a preset, are stored too. While such values may be

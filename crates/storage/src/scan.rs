@@ -169,7 +169,7 @@ impl Scan {
     }
 
     /// Takes the intact records of damaged transactions, from the end of the last transaction up to `to`. Stops at a
-    /// save that was cut: nothing of it counts, and nothing is lost.
+    /// save that was cut: its records do not count, and nothing is lost.
     fn salvage<F: ReadNorFlash>(&mut self, flash: &mut F, to: u32) -> Result<(), F::Error> {
         self.tidy = false;
         while self.end < to {

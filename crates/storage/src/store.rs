@@ -42,7 +42,7 @@ impl<F: NorFlash> Store<F> {
     /// Nothing is therefore ever appended to doubtful words, and the values read at this start are final. If `erases` is too
     /// small, the store can be [full](Error::Full) until [`make_room`](Store::make_room).
     ///
-    /// To be called at start-up, before the node goes on the bus: an erase of 16 KiB stops a single-bank flash for
+    /// To be called at start-up, before the node joins the bus: an erase of 16 KiB stops a single-bank flash for
     /// 0.25 s, and there can be two. Most starts erase nothing.
     ///
     /// # Errors

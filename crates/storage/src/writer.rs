@@ -44,7 +44,7 @@ impl From<Content> for Record<'_> {
     }
 }
 
-/// The records of a transaction; groups without one stay as they are.
+/// The records of a transaction; groups without a record are unchanged.
 pub(crate) type Records<'a> = PerGroup<Option<Record<'a>>>;
 
 /// Size of a transaction in bytes. Values have at most [`crate::MAX_VALUE`] bytes.

@@ -26,7 +26,7 @@ fn emergencies(world: &mut sim::world::World, master: &Master, span: Time) -> Ve
 
 /// The receive interrupts are delayed by 20 ms: the FIFO overflows, and the node reports the loss.
 #[test]
-fn frames_that_the_fifo_loses_are_told() {
+fn frames_lost_by_the_fifo_are_reported() {
     let mut world = running();
     let master = Master::join(&mut world);
     let now = world.machine(0).now();
@@ -48,7 +48,7 @@ fn frames_that_the_fifo_loses_are_told() {
 
 /// The next frames are destroyed, too few for bus-off.
 #[test]
-fn an_error_passive_node_tells_it() {
+fn an_error_passive_node_sends_an_emcy() {
     let mut world = running();
     let master = Master::join(&mut world);
     let next = world.bus().frames();
@@ -81,10 +81,10 @@ fn a_participant_with_a_wrong_bit_rate_is_outlived() {
 }
 
 /// For half a minute (two minutes with `--thorough`) another participant sends only a frame that is more urgent than
-/// all frames of the node. The node is silent for this time, but goes on measuring, and sends again in the first gap.
-/// Of its heartbeats and PDOs it has kept the frame in the mailbox and the newest one.
+/// all frames of the node. The node is silent for this time, but measures, and sends again in the first gap.
+/// The frame in the mailbox and the newest one of its heartbeats and PDOs are kept.
 #[test]
-fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
+fn a_node_silenced_for_minutes_by_more_urgent_frames_recovers() {
     const BIT_RATE: u32 = 125_000;
     const MORE_URGENT: u16 = 0x001;
     let seconds = either(30, 120);

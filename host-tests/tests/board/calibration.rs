@@ -55,7 +55,7 @@ fn cycles(line: &str, name: &str) -> f64 {
 }
 
 #[test]
-fn what_the_model_says_beside_what_is_published() {
+fn the_cycles_of_the_model_are_within_the_published_range() {
     let [best, modelled, worst] = [Estimate::Best, Estimate::Modelled, Estimate::Worst].map(measured);
     println!("| cycles of | published | best | modelled | worst |\n|---|---|---|---|---|");
     for (place, (name, least, most)) in LINES.into_iter().enumerate() {

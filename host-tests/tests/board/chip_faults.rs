@@ -116,7 +116,7 @@ fn stop_crystal(world: &mut World, until: Time) {
 
 /// Without the crystal the node never joins the bus, and the watchdog restarts it again and again.
 #[test]
-fn a_node_without_its_clock_is_silent_and_comes_back_with_it() {
+fn a_node_without_its_clock_is_silent_and_starts_with_the_clock() {
     let mut world = running();
     stop_crystal(&mut world, SECOND * 5);
     let now = world.now();
@@ -149,7 +149,7 @@ fn a_node_whose_clock_fails_leaves_the_bus_at_once() {
 
 /// The 32-bit counter of microseconds reaches its half and its end, as happens every 71 minutes.
 #[test]
-fn the_time_goes_on_where_its_counter_wraps() {
+fn timers_continue_when_the_counter_of_the_time_base_wraps() {
     let mut world = running();
     let master = Master::join(&mut world);
     for before in [0x7FFF_0000, 0xFFFF_0000] {
@@ -242,7 +242,7 @@ fn store(world: &mut World, master: &Master, value: [u8; 4]) {
 
 /// Flash cells that cannot be programmed: the client gets an error, and the earlier saved values stay.
 #[test]
-fn a_flash_that_does_not_take_a_save_is_told() {
+fn a_flash_that_does_not_program_aborts_the_save() {
     let mut world = world("--bitrate 1000");
     let master = Master::join(&mut world);
     world.run_until(SECOND);

@@ -183,7 +183,7 @@ enum Kind {
 
 /// Every group and every kind of damage.
 #[test]
-fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_instead() {
+fn only_the_damaged_group_is_reported_with_its_code_and_its_replacement() {
     let _expected = expects([Rule::SaveLost]);
     for group in ALL {
         for kind in [Kind::Newest, Kind::Superseded, Kind::Only] {
@@ -233,7 +233,7 @@ fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_inste
     }
 }
 
-/// `cargo sim --flash`: the kept flash of a board with a damaged device record stays as it is, and the node reports it.
+/// `cargo sim --flash`: the kept flash of a board with a damaged device record is not changed, and the node reports the damage.
 #[test]
 fn the_simulator_keeps_the_parameters_of_a_board_with_a_damaged_device_record() {
     let dir = std::env::temp_dir().join(format!("sim-damaged-{}", std::process::id()));

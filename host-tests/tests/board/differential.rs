@@ -126,7 +126,7 @@ fn said_in_this_process(serial_number: u32, script: &[Line]) -> Said {
 }
 
 #[test]
-fn the_image_says_what_the_node_in_this_process_says() {
+fn the_image_transmits_the_same_as_the_node_in_this_process() {
     let mut compared = 0;
     for seed in 0..4 {
         let mut world = world("--bitrate 1000 --pressure const:100000 --temperature const:298.15");

@@ -142,7 +142,7 @@ pub(crate) fn start_absolute(flags: &str) -> (World, Master) {
 }
 
 #[test]
-fn the_absolute_encoder_tells_where_the_shaft_is() {
+fn the_absolute_encoder_measures_the_position_of_the_shaft() {
     let (mut world, master) = start_absolute("--shaft const:1234.5");
     assert_eq!(f64::from(read(&mut world, &master, POSITION)), 1234.5 * STEPS);
     assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
@@ -167,7 +167,7 @@ fn the_absolute_encoder_follows_a_fast_shaft_both_ways_over_its_zero() {
 }
 
 #[test]
-fn faults_of_the_absolute_encoder_are_told() {
+fn faults_of_the_absolute_encoder_are_reported() {
     let (mut world, master) =
         start_absolute("--shaft const:2.25 --fault open-ssi@2..3 --fault wrong-code@4..5");
     // Half a revolution then takes four seconds, and is implausible for that time.
@@ -207,7 +207,7 @@ fn the_turns_are_kept_through_a_loss_of_power() {
 }
 
 #[test]
-fn without_a_battery_the_count_begins_anew() {
+fn without_a_battery_the_count_restarts() {
     let (mut world, master) = start("--fault battery-empty@0");
     stimulate(&mut world, "shaft", "rpm:600");
     wait(&mut world, 1000);

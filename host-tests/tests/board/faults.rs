@@ -50,7 +50,7 @@ fn a_wild_jump_ends_in_a_recorded_reset_with_its_address() {
 
 /// The program enables an interrupt without a handler, and the interrupt comes.
 #[test]
-fn an_interrupt_that_nobody_serves_ends_in_a_recorded_reset() {
+fn an_interrupt_without_a_handler_ends_in_a_recorded_reset() {
     /// STR r2, \[r0\]; STR r2, \[r1\]; B to itself.
     const CODE: [u8; 6] = [0x02, 0x60, 0x0A, 0x60, 0xFE, 0xE7];
     let mut world = running();
@@ -65,7 +65,7 @@ fn an_interrupt_that_nobody_serves_ends_in_a_recorded_reset() {
 }
 
 #[test]
-fn a_crash_is_told_once() {
+fn a_crash_is_reported_once() {
     let mut world = running();
     world.machine(0).set_register(PC, 0x3000_0000);
     comes_back(&mut world);

@@ -116,7 +116,7 @@ fn a_byte_that_is_left_over_is_not_taken_for_the_next_word() {
 /// If bytes are lost again and again, the node reports a missing signal, as for an open line; the report ends with the
 /// loss.
 #[test]
-fn bytes_that_are_lost_for_long_are_told() {
+fn bytes_lost_for_more_than_two_milliseconds_are_reported() {
     let (mut world, master) = start_absolute("--shaft const:2.25");
     let expected = read(&mut world, &master, POSITION);
     lose(&mut world, Loss::SpiByte, 1000);
@@ -144,7 +144,7 @@ fn a_lost_copy_of_the_count_is_noticed() {
     assert_silent(&mut world);
 }
 
-/// A stopped sampling is restarted within milliseconds; the counter of the encoder goes on.
+/// A stopped sampling is restarted within milliseconds; the counter of the encoder continues.
 #[test]
 fn a_sampling_that_stands_still_is_started_again() {
     let (mut world, master) = turning(false);
@@ -197,7 +197,7 @@ fn a_lost_alarm_is_noticed_by_the_time() {
 
 /// The time base passes its half and its end without the interrupts for them.
 #[test]
-fn the_time_goes_on_without_the_interrupt_of_its_wrap() {
+fn timers_continue_without_the_interrupt_of_the_wrap() {
     let mut world = running();
     let master = Master::join(&mut world);
     for before in [0x7FFF_0000, 0xFFFF_0000] {
@@ -347,7 +347,7 @@ fn a_stream_of_the_absolute_encoder_that_stops_is_started_again() {
 
 /// The sampling interrupts are blocked for two milliseconds: of the two waiting samples, the newer one counts.
 #[test]
-fn milliseconds_that_nobody_collects_are_counted() {
+fn uncollected_milliseconds_are_counted() {
     const INTERRUPTS: u32 = 0x18;
     let (mut world, master) = turning(false);
     to_the_next_sample(&mut world);

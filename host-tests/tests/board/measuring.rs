@@ -92,7 +92,7 @@ fn a_parameter_selects_the_sensor_of_the_chip_or_the_thermistor() {
 }
 
 #[test]
-fn a_broken_thermistor_is_told() {
+fn a_broken_thermistor_is_reported() {
     const EMCY: u16 = 0x081;
     let mut world = world("--bitrate 1000 --fault open-thermistor@2..3 --fault shorted-thermistor@4..5");
     let master = Master::join(&mut world);

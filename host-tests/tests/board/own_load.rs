@@ -13,7 +13,7 @@ const PERSONALITIES: [&str; 4] = ["pressure", "encoder", "combined", "lift"];
 /// Producer heartbeat time (1017h) as delivered.
 const HEARTBEAT: Time = Time::from_millis(1000);
 
-/// What the master sees in ten seconds.
+/// Observations of the master in ten seconds.
 struct Seen {
     /// The longest time between two heartbeats.
     heartbeat: Time,

@@ -60,7 +60,7 @@ fn assert_well(world: &mut World, master: &Master) {
 }
 
 #[test]
-fn an_index_that_is_lost_after_it_was_seen_is_told_every_time() {
+fn an_index_lost_after_the_first_one_is_reported_every_time() {
     for behaviour in [0, 1] {
         let (mut world, master) =
             start("--shaft rpm:600 --fault missing-index@2..3 --fault missing-index@4..5");
@@ -80,7 +80,7 @@ fn an_index_that_is_lost_after_it_was_seen_is_told_every_time() {
 
 /// The shaft has 4096 steps per revolution, but the parameter says 4000, so each index is 96 steps off.
 #[test]
-fn an_index_in_the_wrong_place_is_told() {
+fn a_displaced_index_is_reported() {
     let (mut world, master) = start("");
     write(&mut world, &master, RESOLUTION, 4, 4000);
     go_operational(&mut world, &master);
@@ -94,7 +94,7 @@ fn an_index_in_the_wrong_place_is_told() {
 
 /// With the parameters as delivered. While the code is wrong, the position stays at its last right value.
 #[test]
-fn a_jump_of_an_absolute_encoder_is_told_and_not_taken_over() {
+fn a_jump_of_an_absolute_encoder_is_reported_and_rejected() {
     let (mut world, master) = start("--shaft rpm:60 --fault wrong-code@3..6");
     write(&mut world, &master, SENSOR_TYPE, 1, 2);
     wait(&mut world, 10);
@@ -142,7 +142,7 @@ fn a_preset_is_stored_by_itself() {
 
 /// A position that only the memory holds is lost with the memory; the node reports this until the position is preset.
 #[test]
-fn a_count_that_was_lost_with_the_memory_is_told_until_the_position_is_preset() {
+fn a_count_lost_with_the_memory_is_reported_until_a_preset() {
     let (mut world, master) = start("--fault battery-empty@0");
     stimulate(&mut world, "shaft", "ramp:0,37.25,0.5");
     wait(&mut world, 600);
@@ -198,7 +198,7 @@ fn a_position_unit_of_a_lift_keeps_its_preset_and_says_when_its_count_is_lost() 
 
 /// The code of a lift's sensor jumps: the position stays, and a preset at the new place is accepted.
 #[test]
-fn a_jump_of_a_lift_s_sensor_is_told_and_not_taken_over() {
+fn a_jump_of_a_lift_s_sensor_is_reported_and_rejected() {
     const STATE: (u16, u8) = (0x2303, 1);
     let mut world =
         crate::support::world("--node 1:lift --bitrate 1000 --shaft const:2.25 --fault wrong-code@3..100");
@@ -220,7 +220,7 @@ fn a_jump_of_a_lift_s_sensor_is_told_and_not_taken_over() {
 /// 6301h and 6302h by RPDO (CiA 406, table of objects: PDO mapping optional); 6506h states what is supported; 6507h is
 /// 100Ah.
 #[test]
-fn cams_are_switched_by_rpdo_and_objects_say_what_the_board_can_do() {
+fn cams_are_switched_by_rpdo_and_objects_claim_only_what_the_board_measures() {
     let (mut world, master) = start("--shaft const:0.5");
     write(&mut world, &master, PRESET, 4, 2000);
     write(&mut world, &master, (0x6320, 1), 4, 3000);

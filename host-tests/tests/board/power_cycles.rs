@@ -154,7 +154,7 @@ fn an_incremental_encoder_without_a_battery_never_shows_a_wrong_position_as_righ
 
 /// The first start reports that the memory was lost, and the next one reports that it was kept.
 #[test]
-fn a_start_tells_whether_the_battery_has_kept_the_memory() {
+fn the_log_of_a_start_states_whether_the_battery_has_kept_the_memory() {
     for (flags, said) in [("", "the battery has kept"), ("--fault battery-empty@0", "no battery has kept")] {
         let (mut world, _): (World, Master) = start(flags);
         world.take_log();

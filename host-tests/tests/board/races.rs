@@ -87,7 +87,7 @@ fn a_sample_is_whole_and_in_time() {
 /// The battery keeps the position if the power is cut at any instant of the millisecond in which the position is
 /// written: at three of eight instants without `--thorough`.
 #[test]
-fn what_a_battery_keeps_is_valid_after_a_cut_at_any_instant() {
+fn battery_backed_data_is_valid_after_a_cut_at_any_instant() {
     const POSITION: (u16, u8) = (0x6004, 0);
     const COUNTS: f64 = 4096.0;
     for seed in seeds() {

@@ -189,7 +189,7 @@ fn a_kept_flash_is_not_written_without_being_asked() {
 
 /// A stimulus for a board that does not exist is refused, not ignored.
 #[test]
-fn a_stimulus_for_nobody_is_refused() {
+fn a_stimulus_for_an_unknown_node_is_refused() {
     let mut world = world("--node 1");
     let refused = world.apply(&Stimulus::parse("pressure", "5=const:1").unwrap()).unwrap_err();
     assert_eq!(refused.to_string(), "there is no node 5 here");

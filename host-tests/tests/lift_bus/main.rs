@@ -57,7 +57,7 @@ fn a_small_lift() {
 
     every_frame_is_known(&lift.log);
     every_position_is_that_of_the_car(&lift);
-    the_display_knows_what_concerns_it(&mut lift);
+    the_display_shows_the_values_of_its_lift(&mut lift);
     the_lamp_can_be_lit_by_a_multiplexed_pdo(&mut lift);
     assert_eq!(lift.network.traffic().errors, 0);
 }
@@ -131,7 +131,7 @@ fn every_position_is_that_of_the_car(lift: &SmallLift) {
 
 /// The display takes the state of the position unit from that unit's multiplexed PDO, and ignores the unit's other
 /// objects.
-fn the_display_knows_what_concerns_it(lift: &mut SmallLift) {
+fn the_display_shows_the_values_of_its_lift(lift: &mut SmallLift) {
     assert_eq!(lift.shown(0x2303, 1), 0, "within its limits");
     // Ten metres a second: a jump of the car would be a fault of the encoder.
     for _ in 0..270 {

@@ -1,4 +1,4 @@
-//! What every node does, whatever it is.
+//! Services of every node, in every personality.
 
 use canopen::Duration;
 use canopen::dictionary::Mapping;

@@ -113,7 +113,7 @@ fn row(kbit: u16) -> String {
 }
 
 #[test]
-fn the_table_of_bit_timings_is_what_the_bus_shows() {
+fn the_table_of_bit_timings_agrees_with_the_bus() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/board.md");
     let page = std::fs::read_to_string(&path).expect("the page is there");
     let (begin, end) = ("<!-- begin bit timing -->\n", "<!-- end bit timing -->");

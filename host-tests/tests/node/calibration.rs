@@ -65,7 +65,7 @@ fn the_lock_opens_with_its_key_until_the_node_is_reset() {
 }
 
 #[test]
-fn what_is_no_calibration_is_refused_and_leaves_the_old_one() {
+fn an_impossible_calibration_is_refused_and_the_old_one_stays() {
     let mut bench = unlocked(Personality::Pressure);
     let bad: [(u16, u8, f32); 12] = [
         (0x2200, 1, 1_000_000.0), // no range

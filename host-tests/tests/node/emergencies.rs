@@ -222,7 +222,7 @@ fn the_table_has_every_fault_that_the_node_can_signal() {
 }
 
 #[test]
-fn what_is_never_sent_has_a_reason() {
+fn every_code_that_is_never_sent_has_a_reason() {
     let sent: BTreeSet<u16> = Any::all().map(Any::code).collect();
     for row in rows().filter(|row| row.fault.is_none()) {
         assert!(!sent.contains(&row.code) && !row.remark.is_empty(), "{row:X?}");
@@ -230,7 +230,7 @@ fn what_is_never_sent_has_a_reason() {
 }
 
 #[test]
-fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() {
+fn every_fault_is_reported_by_emcy_list_register_and_flag() {
     for row in rows() {
         let Some(fault) = row.fault else { continue };
         let mut bench = measuring();
@@ -263,7 +263,7 @@ fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() 
 }
 
 #[test]
-fn what_the_firmware_takes_back_is_gone_everywhere() {
+fn a_fault_withdrawn_by_the_firmware_is_cleared_everywhere() {
     for row in rows() {
         let (Some(Any::Node(fault)), Some((index, sub, bit))) = (row.fault, row.flag) else { continue };
         let mut bench = measuring();

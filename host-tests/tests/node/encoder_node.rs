@@ -75,7 +75,7 @@ fn tpdo1_carries_the_position_on_entering_operational_and_then_by_its_timer_alon
 }
 
 #[test]
-fn a_node_that_starts_by_itself_sends_no_position_that_it_has_not_measured() {
+fn a_self_starting_node_sends_only_measured_positions() {
     let mut bench = operational();
     // A shaft that turns at a reset has lost its turns.
     (0..=100).for_each(|_| turn_to(&mut bench, 1234));
@@ -157,7 +157,7 @@ fn a_preset_is_the_next_position_and_outlives_a_loss_of_power() {
     // firmware.
     bench.write(0x1010, 3, b"save").unwrap();
     turn_to(&mut bench, 1001);
-    // The shaft stands still while the power is off, and the timer starts at 0 again.
+    // The shaft is at rest while the power is off, and the timer starts at 0 again.
     let mut bench = bench.power_cycled();
     turn_to(&mut bench, 0);
     turn_to(&mut bench, 2);

@@ -187,7 +187,7 @@ fn every_press_reaches_a_full_bus_or_is_covered_by_a_full_state() {
 
 /// While the queue is long enough, every transition is reported individually: the only full state is that of the start.
 #[test]
-fn presses_that_the_queue_can_hold_are_all_told() {
+fn all_presses_within_the_capacity_of_the_queue_are_sent() {
     let (mut panel, mut rng) = (Panel::new(), Rng::with_seed(3));
     panel.nmt(1);
     (0..1000).for_each(|_| panel.pass(Phase::Open));

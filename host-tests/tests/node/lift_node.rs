@@ -306,7 +306,7 @@ fn a_press_between_two_events_of_the_timer_is_sent() {
 }
 
 #[test]
-fn what_is_held_before_the_start_is_told_with_it() {
+fn a_button_held_before_the_start_is_reported_at_the_start() {
     let mut bench = panel(0, 0);
     assert_eq!(hold(&mut bench, [true, true], 50), []);
     bench.nmt(1);

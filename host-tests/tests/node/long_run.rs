@@ -1,4 +1,4 @@
-//! A week of the protocol: every timer goes on, beyond the range of a 32-bit counter of microseconds.
+//! A week of the protocol: every timer continues, beyond the range of a 32-bit counter of microseconds.
 
 use canopen::{Duration, Instant};
 use host_tests::bench::{Bench, ID};

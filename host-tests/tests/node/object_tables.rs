@@ -123,7 +123,7 @@ fn a_value_of_the_wrong_length_is_refused() {
 }
 
 #[test]
-fn what_can_be_mapped_is_sent_and_the_rest_is_refused() {
+fn mappable_objects_are_sent_and_all_others_are_refused() {
     // The profile fixes the mapping of a lift device.
     for (personality, row) in rows().filter(|(personality, _)| *personality != Personality::Lift) {
         let mut bench = without_tpdos(personality);

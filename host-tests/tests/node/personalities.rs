@@ -41,7 +41,7 @@ fn one_that_does_not_exist_is_refused() {
 }
 
 #[test]
-fn a_reset_of_the_communication_shows_what_is_stored() {
+fn a_reset_of_the_communication_restores_the_stored_values() {
     let mut bench = Bench::booted();
     bench.write(0x2000, 0, &[1]).unwrap();
     bench.nmt(0x82);
@@ -80,7 +80,7 @@ fn node_id_and_personality_are_stored_together_and_change_alone() {
 }
 
 #[test]
-fn a_store_that_fails_is_told_and_changes_nothing() {
+fn a_failed_store_is_reported_and_changes_nothing() {
     let mut bench = Bench::booted();
     let now = Instant(1);
     // Written without the bench, which would store the value.

@@ -48,7 +48,7 @@ fn tpdo1_carries_the_live_pressure_and_temperature() {
 }
 
 #[test]
-fn a_node_that_is_started_the_moment_it_boots_sends_what_it_has_measured_before() {
+fn a_node_started_at_its_boot_up_sends_its_first_measurement() {
     let setup = setup();
     let mut protocol = Protocol::new(&setup);
     let mut measurement = Measurement::new(setup.personality, &intact());
@@ -245,7 +245,7 @@ fn the_span_sets_the_overload_bits() {
 }
 
 #[test]
-fn flags_survive_a_reset_as_what_they_report_does() {
+fn flags_survive_a_reset_with_their_faults() {
     let mut bench = Bench::booted();
     bench.set_fault(UNEXPECTED_RESET, true);
     assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
@@ -258,7 +258,7 @@ fn flags_survive_a_reset_as_what_they_report_does() {
 }
 
 #[test]
-fn bus_off_applies_the_communication_error_behaviour_and_is_told_afterwards() {
+fn bus_off_applies_the_communication_error_behaviour_and_is_reported_afterwards() {
     let mut bench = operational();
     bench.bus_event(BusEvent::Passive);
     assert_eq!(emergencies(&mut bench), [(0x8120, 1)]);
@@ -293,7 +293,7 @@ fn a_warning_says_nothing_and_an_overrun_is_an_event() {
 }
 
 #[test]
-fn the_firmware_is_told_what_it_must_do() {
+fn the_device_returns_the_actions_of_the_firmware() {
     let mut bench = Bench::booted();
     assert_eq!(bench.take_action(), Some(Action::Identifiers));
     assert_eq!(bench.take_action(), None);
@@ -369,7 +369,7 @@ fn lowest_and_highest_value_are_kept_until_they_are_restarted() {
 }
 
 #[test]
-fn an_alarm_has_a_hysteresis_and_stays_until_its_reset_if_it_is_latched() {
+fn an_alarm_has_a_hysteresis_and_a_latched_alarm_stays_until_its_reset() {
     let mut bench = Bench::booted();
     assert_eq!(bench.write(0x6503, 1, &0x6150_0108_u32.to_le_bytes()), Err(0x0609_0030));
     for (alarm, kind, action, limit) in [(1, 1, 0, 5.0_f32), (2, 1, 1, 5.0), (3, 2, 0, 2.0)] {

@@ -164,7 +164,7 @@ fn each_step(mut then: impl FnMut(&mut Bus, Transfer, usize)) {
 }
 
 #[test]
-fn a_client_that_dies_is_told_and_forgotten_after_the_time_out() {
+fn a_transfer_of_a_dead_client_is_aborted_after_the_time_out() {
     each_step(|network, transfer, step| {
         network.run(TIME_OUT);
         let last = responses(network).last().copied().and_then(Response::parse);

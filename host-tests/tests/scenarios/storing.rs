@@ -3,7 +3,7 @@
 use canopen::Frame;
 use host_tests::bench::{Bench, ID};
 
-/// An SDO request whose answer nobody awaits.
+/// An SDO request without a wait for its answer.
 fn request(bench: &mut Bench, data: [u8; 8]) {
     bench.receive(&Frame::new(0x600 + u16::from(ID), &data).expect("a frame"));
 }

@@ -141,7 +141,7 @@ async fn the_transfer_buffer_takes_four_kib_by_both_transfers() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn nmt_commands_move_the_node_and_the_heartbeat_tells() {
+async fn nmt_commands_change_the_state_in_the_heartbeat() {
     let (port, mut manager) = manager();
     for (number, expected) in [(1, NmtState::Operational), (2, NmtState::Stopped)] {
         if number == 1 {
@@ -164,7 +164,7 @@ async fn nmt_commands_move_the_node_and_the_heartbeat_tells() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_scan_finds_the_node_and_what_it_is() {
+async fn a_scan_finds_the_node_and_its_identity() {
     let (_, mut manager) = manager();
     let nodes = manager.scan_nodes().await.unwrap();
     assert_eq!(nodes.len(), 1);
@@ -179,7 +179,7 @@ async fn a_scan_finds_the_node_and_what_it_is() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_tpdo_is_remapped_and_sends_what_it_should() {
+async fn a_remapped_tpdo_sends_the_new_content() {
     let (port, mut client) = node();
     let mapping = |index, sub, size| PdoMapping { index, sub, size };
     let config = PdoConfig {
@@ -205,7 +205,7 @@ async fn a_tpdo_is_remapped_and_sends_what_it_should() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_is_saved_is_there_after_a_reset() {
+async fn saved_values_survive_a_reset() {
     let (port, mut client) = node();
     client.write_u32(0x4000, 1, 77).await.unwrap();
     client.write_u16(0x1017, 0, 250).await.unwrap();

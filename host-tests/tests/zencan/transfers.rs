@@ -50,7 +50,7 @@ async fn values_of_the_image_go_by_every_transfer() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_is_too_long_is_refused_and_the_server_is_free_again() {
+async fn a_download_that_is_too_long_is_refused_and_the_server_is_free_again() {
     let (_, mut client) = device();
     let code = |error| match error {
         SdoClientError::ServerAbort { abort_code: RawAbortCode::Valid(code), .. } => code as u32,

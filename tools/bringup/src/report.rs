@@ -1,4 +1,4 @@
-//! What the steps have seen, as JSON for the next run and as HTML for people.
+//! The results of the steps, as JSON for the next run and as HTML for people.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -34,15 +34,15 @@ pub fn exit_code(outcome: Anyhow<Result>) -> ExitCode {
 /// A check: what was seen, what was expected, and what to do when they differ.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Check {
-    /// What was checked.
+    /// The checked property.
     pub what: String,
-    /// What was seen.
+    /// The observed value.
     pub seen: String,
-    /// What was expected.
+    /// The expected value.
     pub expected: String,
     /// The result.
     pub result: Result,
-    /// What to do when it is red.
+    /// The remedy of a failure.
     pub remedy: String,
 }
 
@@ -53,7 +53,7 @@ pub struct StepReport {
     pub number: usize,
     /// Its name.
     pub name: String,
-    /// What it shows.
+    /// The property that it shows.
     pub about: String,
     /// The result of all checks.
     pub result: Result,

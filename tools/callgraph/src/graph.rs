@@ -64,7 +64,7 @@ impl Graph {
     }
 
     /// The bytes of stack that a function takes: the larger one of the compiler's note and the sum over the
-    /// instructions. The sum is larger where the compiler has later moved a part of the function out of it and saves a
+    /// instructions. The sum is larger where the compiler has later moved out a part of the function and saves a
     /// register around the call.
     pub(crate) fn frame(&self, image: &Image<'_>, start: u32) -> Result<u32> {
         let function = image.function_at(start).context("not in the image")?;

@@ -1,6 +1,6 @@
 //! Editions of a data sheet: a sheet with other objects gets another revision and date.
 //!
-//! The file in the tree is the record: a sheet that is equal but for its edition keeps the edition of the file.
+//! The file in the tree is the record: a sheet that differs in its edition only keeps the edition of the file.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 

@@ -102,7 +102,7 @@ impl Eds {
         if found.is_empty() {
             found = near.into_iter().filter(|(nearness, _)| *nearness >= NEAR).collect();
         }
-        // Of equally near names the shortest comes first: the text makes up a larger part of it.
+        // The shortest of equally near names is first: the text is a larger part of that name.
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.len().cmp(&b.1.len())));
         listed(found.into_iter().map(|(_, path)| path))
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{DEVICES, Edition, page};
+use crate::{DEVICES, Edition, data_sheet, page};
 
 /// A file that is generated.
 #[derive(Clone, Debug)]
@@ -13,7 +13,7 @@ pub struct File {
     pub text: String,
 }
 
-/// Every generated file: a data sheet for each device, and the reference page.
+/// Every generated file: an EDS for each device, the reference page, and the data sheet of the product.
 #[must_use]
 pub fn files() -> Vec<File> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap_or(Path::new("."));
@@ -22,6 +22,8 @@ pub fn files() -> Vec<File> {
         let file = std::fs::read_to_string(&path).unwrap_or_default();
         File { path, text: device.sheet(&Edition::after(&file, device)) }
     });
-    let page = File { path: root.join("docs/object-dictionary.md"), text: page::page(&DEVICES) };
-    sheets.chain([page]).collect()
+    let documents = root.join("docs");
+    let page = File { path: documents.join("object-dictionary.md"), text: page::page(&DEVICES) };
+    let data_sheet = File { path: documents.join("data-sheet.md"), text: data_sheet::text(&documents) };
+    sheets.chain([page, data_sheet]).collect()
 }

@@ -104,7 +104,7 @@ impl<'a> Section<'a> {
         value
     }
 
-    /// The number of a key; 0 where there is none. A wrong number is a warning.
+    /// The number of a key; 0 without a key. A wrong number is a warning.
     pub(crate) fn number<T: TryFrom<i128> + Default>(self, key: &'static str) -> T {
         let Some(text) = self.get(key) else { return T::default() };
         let read = |text: &str| number(text).and_then(|value| T::try_from(value).ok());

@@ -2,10 +2,11 @@
 //!
 //! [`Eds`] is a data sheet as a value. [`Device::eds`] makes a data sheet from the dictionary table of a personality,
 //! and [`Device::sheet`] makes the text. [`Eds::parse`] reads the text of any vendor. [`files`] is all generated text
-//! in the tree of the project: the data sheets and the reference page. `cargo xtask eds` writes these files.
+//! in the tree of the project: the data sheets of the devices, the reference page and the data sheet of the product. `cargo xtask eds` writes these files.
 #![forbid(unsafe_code)]
 
 mod compact;
+mod data_sheet;
 mod dcf;
 mod device;
 mod edition;

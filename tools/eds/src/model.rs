@@ -105,7 +105,7 @@ pub struct Entry {
     pub high: Option<Formula>,
     /// Whether a PDO can carry the entry.
     pub mappable: bool,
-    /// What a master does not do with the entry (`ObjFlags`); `None` in a data sheet that does not use the flags.
+    /// Actions that a master leaves out for the entry (`ObjFlags`); `None` in a data sheet that does not use the flags.
     pub flags: Option<Flags>,
     /// Physical unit. CiA 306 has no place for units: they are written as a comment and never read.
     pub unit: String,

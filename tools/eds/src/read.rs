@@ -28,8 +28,8 @@ impl Eds {
     /// Reads a data sheet (EDS) or a configuration file (DCF) of any vendor.
     ///
     /// Mistakes in sections and keys are [warnings](Eds::warnings): a missing name is replaced by the address, a missing
-    /// or unknown type by DOMAIN, a missing or unknown access by `ro`; a wrong value is left out, or read as far as it is
-    /// a value (`0.0f`, `12UL`, `5 // off`). Unknown sections and keys are ignored.
+    /// or unknown type by DOMAIN, a missing or unknown access by `ro`; a wrong value is left out,
+    /// or read up to its mistake (`0.0f`, `12UL`, `5 // off`). Unknown sections and keys are ignored.
     ///
     /// # Errors
     /// The text is not made of sections and keys.

@@ -15,7 +15,7 @@ pub enum Value {
     Text(String),
 }
 
-/// The form of real numbers in a file. There is none that all tools read.
+/// The form of real numbers in a file. No form is read by all tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reals {
     /// The bits, as `0x3FC00000`. Lely's tools refuse a file with any other form. python-canopen does not know the value
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn written_values_read_back() {
         for (text, data_type) in [
             ("$NODEID+0x180", UNSIGNED32),
             ("0x004E0000", UNSIGNED32),

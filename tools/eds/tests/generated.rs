@@ -19,10 +19,21 @@ fn the_generated_files_are_up_to_date() {
 #[test]
 fn the_page_has_every_object_once_for_each_device_that_has_it() {
     let files = files();
-    let page = files.iter().find(|file| file.path.extension().is_some_and(|name| name == "md")).unwrap();
+    let page = files.iter().find(|file| file.path.ends_with("object-dictionary.md")).unwrap();
     let indices: Vec<u16> = DEVICES.iter().flat_map(|device| device.eds().objects.into_keys()).collect();
     for index in &indices {
         let times = indices.iter().filter(|other| *other == index).count();
         assert_eq!(page.text.matches(&format!("| {index:04X}h | 0 ")).count(), times, "{index:04X}h");
+    }
+}
+
+#[test]
+fn every_section_of_the_data_sheet_has_a_table() {
+    let files = files();
+    let sheet = files.iter().find(|file| file.path.ends_with("data-sheet.md")).unwrap();
+    let sections: Vec<&str> = sheet.text.split("\n## ").skip(1).collect();
+    assert_eq!(sections.len(), 8);
+    for section in sections {
+        assert!(section.contains("|---|"), "{section}");
     }
 }

@@ -41,7 +41,7 @@ fn the_path_of_every_entry_finds_it() {
 }
 
 #[test]
-fn an_unknown_name_lists_what_is_near() {
+fn an_unknown_name_lists_similar_names() {
     let eds = DEVICES[0].eds();
     let error = eds.find("vendor").unwrap_err();
     assert_eq!(
@@ -86,7 +86,7 @@ fn near_misses_are_suggested_nearest_first() {
 }
 
 #[test]
-fn what_is_no_address_is_refused() {
+fn a_text_that_is_no_address_is_refused() {
     for text in [
         "",
         "101",

@@ -122,7 +122,7 @@ fn object(lines: &str) -> Error {
 }
 
 #[test]
-fn an_error_says_where_it_is() {
+fn an_error_names_its_line() {
     let error = object("ParameterName=X\nDataType=0xZZ\nAccessType=rw\n");
     assert_eq!((&error.section[..], error.key, error.line), ("2001", "DataType", Some(5)));
     let text = "line 5: [2001] DataType: \"0xZZ\" is not a number of at most 16 bits";
@@ -130,7 +130,7 @@ fn an_error_says_where_it_is() {
 }
 
 #[test]
-fn what_is_missing_is_named_with_the_line_of_its_section() {
+fn missing_keys_are_named_with_the_line_of_their_section() {
     let error = object("ParameterName=X\nDataType=5\n");
     assert_eq!(error.to_string(), "line 3: [2001] AccessType: is missing");
     assert_eq!(error.problem, Problem::Missing);

@@ -20,7 +20,7 @@ pub(crate) struct Boot {
 }
 
 impl Boot {
-    /// The node is switched on, or somebody has reset it or its chip.
+    /// The node is switched on, or it or its chip was reset.
     pub(crate) fn restarts(&mut self, now: Instant) {
         (self.since, self.has_reason) = (Some(now), true);
     }

@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn room_is_what_more_urgent_frames_of_others_leave() {
+    fn the_room_of_a_frame_is_the_time_without_more_urgent_frames() {
         let mut bus = Bus::new();
         bus.set_bit_rate(1_000_000);
         for n in 0..100 {

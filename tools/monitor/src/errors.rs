@@ -53,7 +53,7 @@ impl Errors {
         self.doubts.retain(|doubt| matches!(doubt.what, What::Register(_)));
     }
 
-    /// The time for an EMCY begins anew.
+    /// The time for an EMCY restarts.
     pub(crate) fn resume(&mut self, now: Instant) {
         self.doubts.iter_mut().for_each(|doubt| doubt.at = now);
     }

@@ -15,7 +15,7 @@ impl Heartbeat {
         (self.last, self.is_reported) = (Some(now), false);
     }
 
-    /// The time begins anew.
+    /// The time restarts.
     pub(crate) fn resume(&mut self, now: Instant) {
         self.last = self.last.map(|_| now);
     }

@@ -42,5 +42,5 @@ pub use watch::{Incident, Monitor, Sender};
 /// Index and sub-index of an object.
 pub type Key = (u16, u8);
 
-/// What a part of the monitor has found: a rule and a description.
+/// A finding of a part of the monitor: a rule and a description.
 pub(crate) type Findings = Vec<(Rule, String)>;

@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 500.0;
 /// Messages of a TPDO that wait for the bus at most: one in the queue, and one in each of three mailboxes.
 const WAITING: u32 = 4;
 
-/// The settings of a TPDO, as far as they are known.
+/// The settings of a TPDO, where known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     pub(crate) id: u16,
@@ -77,7 +77,7 @@ impl Pdos {
         self.sent.clear();
     }
 
-    /// A setting of a TPDO was written. A TPDO that becomes valid starts anew.
+    /// A setting of a TPDO was written. A TPDO that becomes valid restarts.
     pub(crate) fn configured(&mut self, index: u16, sub: u8, was_off: bool) {
         if let Some(sent) = self.sent.get_mut(&index) {
             if sub == 1 && was_off {

@@ -93,7 +93,7 @@ impl Channel {
         *self = Channel { expect: Expect::Nothing, ..Channel::new() };
     }
 
-    /// The object whose request is without an answer since a second; `None` while there is none. A request is reported
+    /// The object whose request is without an answer since a second; `None` without such an object. A request is reported
     /// once.
     pub(crate) fn overdue(&self, now: Instant) -> Option<(Key, Instant)> {
         let is_waiting = !matches!(self.expect, Expect::Nothing | Expect::Anything);
@@ -106,7 +106,7 @@ impl Channel {
         self.expect == Expect::Nothing && self.transfer.is_none()
     }
 
-    /// The time for an answer begins anew.
+    /// The time for an answer restarts.
     pub(crate) fn resume(&mut self, now: Instant) {
         self.since = now;
     }

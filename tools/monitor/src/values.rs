@@ -11,7 +11,7 @@ const LOAD: &[u8] = b"load";
 /// Node-ID-dependent default CAN-IDs of the first four TPDOs (CiA 301, 7.3.3).
 const TPDO_CAN_IDS: [u32; 4] = [0x180, 0x280, 0x380, 0x480];
 
-/// What is known of the saved value.
+/// Knowledge about the saved value.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 enum Saved {
     #[default]

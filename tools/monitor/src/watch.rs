@@ -193,7 +193,7 @@ impl Monitor {
         self.report(own, findings);
     }
 
-    /// The caller has not served the nodes until now: the rules about time begin anew.
+    /// The caller has not served the nodes until now: the rules about time restart.
     pub fn resume(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.devices.iter_mut().for_each(|device| device.resume(now));
@@ -309,7 +309,7 @@ impl Monitor {
         self.others(at, frame);
     }
 
-    /// The CAN-ID is the node's, and nobody else sends it.
+    /// The CAN-ID is the node's, and no other node sends it.
     fn check_id(&mut self, own: usize, id: u16, findings: &mut Findings) {
         let device = &self.devices[own];
         if device.participant.is_none() || device.is_injected() {

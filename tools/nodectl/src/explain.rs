@@ -18,9 +18,9 @@ pub struct Emergency {
     pub name: String,
     /// The content of the error field.
     pub field: String,
-    /// What has happened.
+    /// The cause.
     pub cause: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 
@@ -31,7 +31,7 @@ pub struct Abort {
     pub code: u32,
     /// When the node sends it.
     pub cause: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_field_tells_errors_of_one_code_apart() {
+    fn the_error_field_distinguishes_errors_of_one_code() {
         let names: Vec<&str> =
             (0..3).map(|detail| emergency(0x5006, detail).unwrap().name.as_str()).collect();
         assert_eq!(names, ["sensor break", "encoder does not answer", "position of the encoder is wrong"]);

@@ -15,7 +15,7 @@ use crate::value::Value;
 pub struct Reading {
     /// The meaning of the PDO.
     pub pdo: &'static str,
-    /// The node-ID of the sender, where the CAN-ID tells it.
+    /// The node-ID of the sender, where the CAN-ID contains it.
     pub producer: Option<u8>,
     /// The object.
     pub at: Multiplexer,
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_multiplexed_pdo_says_itself_what_it_carries() {
+    fn a_multiplexed_pdo_names_its_object() {
         let state = readings(0x510, &[0x80, 0x03, 0x23, 1, 2, 0, 0, 0]);
         assert_eq!(state, texts(&[("Position unit states/Position unit 1 state", "2")]));
         assert_eq!(readings(0x510, &[0x80, 0x83, 0x63, 2, 1, 1, 0, 0]), texts(&[("position 2", "257")]));
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_off_or_of_somebody_else_is_left_out() {
+    fn short_frames_and_frames_of_other_devices_are_ignored() {
         assert_eq!(readings(0x188, &[5, 1]), texts(&[("load signals", "5")]));
         assert_eq!(readings(0x1A1, &[0; 8]), []);
         assert_eq!(readings(0x701, &[5]), []);

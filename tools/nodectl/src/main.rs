@@ -36,7 +36,7 @@ fn usage(error: &clap::Error) -> ExitCode {
 }
 
 fn report(failure: &Failure, json: bool) {
-    // Nobody may read any more: `println!` and `eprintln!` would panic.
+    // The reader may be gone: `println!` and `eprintln!` would panic.
     let _ = if json {
         writeln!(std::io::stdout(), "{}", failure.to_json())
     } else {

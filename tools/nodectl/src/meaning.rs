@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_numbers_of_a_pressure_transmitter_say() {
+    fn values_of_a_pressure_transmitter_have_a_meaning() {
         let catalogue = Catalogue::of_file("pressure.eds").expect("a data sheet");
         let says = |index, sub, number| of(&catalogue, at(index, sub), &Value::Integer(number));
         assert_eq!(says(0x6131, 1, 0xFD4E_0000).as_deref(), Some("mbar"));

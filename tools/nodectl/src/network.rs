@@ -43,7 +43,7 @@ pub struct Logged {
     pub is_sent: bool,
 }
 
-/// What was heard of a node, whether it answers or not.
+/// The messages received from a node, whether it answers requests or not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
     /// The state in the newest heartbeat or boot-up message; `None` without one.
@@ -53,11 +53,11 @@ pub struct Heard {
 /// Whether a transfer may begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gate {
-    /// It may begin.
+    /// The transfer may begin.
     Open,
-    /// It may begin now, after it had to wait.
+    /// The transfer may begin now, after a wait.
     Waited,
-    /// Nobody wants the transfer any more.
+    /// The transfer is no longer wanted.
     Closed,
 }
 
@@ -99,12 +99,12 @@ impl Network {
         })
     }
 
-    /// Calls `gate` before each transfer. It may wait there for the transfers of somebody else.
+    /// Calls `gate` before each transfer. The gate may wait for the transfers of other clients.
     pub fn set_gate(&mut self, gate: impl FnMut() -> Gate + 'static) {
         self.gate = Box::new(gate);
     }
 
-    /// Passes the gate. Frames that have come while the gate was closed belong to the transfers of somebody else.
+    /// Passes the gate. Frames that have come while the gate was closed belong to the transfers of other clients.
     ///
     /// # Errors
     /// The gate has been closed for good, or the bus is lost.
@@ -168,7 +168,7 @@ impl Network {
         heartbeats.filter(|heard| heard.node == node).map(|heard| heard.state).next()
     }
 
-    /// What was heard of a node since the bus was opened: heartbeats, emergencies, and PDOs of the pre-defined connection
+    /// The messages received from a node since the bus was opened: heartbeats, emergencies, and PDOs of the pre-defined connection
     /// set. `None` where nothing was heard.
     #[must_use]
     pub fn heard(&self, node: NodeId) -> Option<Heard> {

@@ -12,7 +12,7 @@ use crate::value::{Value, ValueError};
 /// The unit of a value, and the scale of its number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Quantity {
-    /// The unit; empty where there is none.
+    /// The unit; empty without a unit.
     pub unit: String,
     /// The scale; `None` where the number is the value.
     scale: Option<Scale>,
@@ -93,7 +93,7 @@ impl Quantity {
         }
     }
 
-    /// The number on the wire for a value that a person has typed, as it is shown: `2` and `2.0` are the same. A
+    /// The number on the wire for a value that a person has typed, in its displayed form: `2` and `2.0` are the same. A
     /// hexadecimal text is the number itself.
     ///
     /// # Errors

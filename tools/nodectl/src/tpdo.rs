@@ -1,4 +1,4 @@
-//! The TPDOs of a node as they are configured, and the values in their frames.
+//! The configured TPDOs of a node, and the values in their frames.
 
 use canopen::CobId;
 use canopen::pdo::MappedObject;

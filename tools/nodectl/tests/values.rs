@@ -92,7 +92,7 @@ fn bytes_on_the_wire() {
 }
 
 #[test]
-fn the_limits_are_told() {
+fn limits_are_part_of_the_error() {
     let message = |text, name| Value::parse(text, data_type(name).unwrap()).unwrap_err().to_string();
     assert_eq!(message("256", "u8"), "\"256\" is not a whole number from 0 to 255");
     assert_eq!(message("-32769", "i16"), "\"-32769\" is not a whole number from -32768 to 32767");

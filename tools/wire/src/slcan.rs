@@ -1,6 +1,6 @@
 //! slcan: the line protocol of the LAWICEL CAN232 and CANUSB adapters ("CANUSB Manual", version 1.0, chapter 3).
 //!
-//! A frame is the same line in both directions, but for the time stamp that an adapter may append. Every line ends with a
+//! A frame is the same line in both directions, except for the time stamp that an adapter may append. Every line ends with a
 //! carriage return, which is not part of what is read and written here.
 
 use embedded_can::Frame;

@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_stamp_says_what_it_was_made_of() {
+    fn a_time_stamp_reads_back() {
         for micros in [0, 1, 999_999, 1_000_000, 1_436_509_052_249_713, u64::MAX] {
             assert_eq!(parse(&text(micros)), Some(micros));
         }

@@ -72,7 +72,7 @@ struct Copy {
 }
 
 impl Copy {
-    /// Copies all files that git tracks, as they are now. A file that has not changed keeps its time, so that cargo
+    /// Copies all files that git tracks, in their present state. A file that has not changed keeps its time, so that cargo
     /// compiles only what has.
     fn make() -> Result<Copy> {
         let home = target_dir().join("regressions");

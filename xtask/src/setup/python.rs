@@ -16,7 +16,7 @@ pub(crate) fn clients() -> Result<PathBuf> {
     ensure(&target_dir().join("venv"), "host-tests/python/requirements.txt")
 }
 
-/// The interpreter of an environment with the packages of a list. The environment is made anew when the list has
+/// The interpreter of an environment with the packages of a list. The environment is made again when the list has
 /// changed.
 pub(crate) fn ensure(environment: &Path, list: &str) -> Result<PathBuf> {
     let python = environment.join("bin/python");

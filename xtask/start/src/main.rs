@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_needs_what_it_cannot_do_without() {
+    fn a_command_has_its_needs() {
         assert_eq!(needs_of(&["sim", "--for", "5"]), needs::SIM);
         assert_eq!(needs_of(&["test", "--only", "eds"]), needs::TEST);
         assert_eq!(needs_of(&["test", "--thorough"]), needs::THOROUGH);

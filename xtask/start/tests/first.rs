@@ -33,7 +33,7 @@ fn was_called(machine: &Path, program: &str) -> Vec<String> {
 }
 
 #[test]
-fn what_is_missing_is_named_before_cargo_compiles_anything() {
+fn missing_packages_are_named_before_cargo_compiles() {
     let programs = [("apt-get", "exit 0"), ("id", "echo 1000"), ("cargo", "exit 0"), ("rustup", "exit 0")];
     let machine = machine("bare", &programs);
     for (arguments, packages) in [
@@ -49,7 +49,7 @@ fn what_is_missing_is_named_before_cargo_compiles_anything() {
 }
 
 #[test]
-fn where_nothing_is_missing_or_root_installs_xtask_goes_on_with_the_arguments() {
+fn without_missing_packages_xtask_runs_with_the_arguments() {
     let all = ["cc", "make", "cmake", "rustup"].map(|program| (program, "exit 0"));
     let root = [("apt-get", "exit 0"), ("id", "echo 0"), ("rustup", "exit 0")];
     for (name, programs) in [("complete", &all[..]), ("root", &root)] {

@@ -35,7 +35,7 @@ pub fn start(core: &cortex_m::Peripherals, vectors: Vectors) -> ! {
     let table = memory::application().start ^ wrong;
     cortex_m::interrupt::disable();
     // SAFETY: the slot is aligned as VTOR needs it (memory.x), `vectors` is checked, and this function does not return,
-    // so nobody misses the stack. Interrupts are enabled again, as after a reset; none is enabled in the NVIC.
+    // so the stack is not needed. Interrupts are enabled again, as after a reset; none is enabled in the NVIC.
     unsafe {
         for (enabled, pending) in core.NVIC.icer.iter().zip(&core.NVIC.icpr).take(INTERRUPT_WORDS) {
             enabled.write(u32::MAX);

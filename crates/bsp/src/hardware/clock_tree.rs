@@ -96,7 +96,7 @@ pub(super) fn lower(rcc: &RCC) {
     wait(|| rcc.cr().read().pllrdy().bit_is_clear());
     rcc.cr().modify(|_, w| w.hsebyp().clear_bit());
     rcc.pllcfgr().reset();
-    // SAFETY: the flash driver has done its work. Without an operation under way nobody depends on the wait states and
+    // SAFETY: the flash driver has done its work. Without an operation under way no code depends on the wait states and
     // the caches, and the reset value of ACR suits the present 16 MHz.
     let acr = unsafe { (*FLASH::ptr()).acr() };
     acr.reset();

@@ -25,7 +25,7 @@ const REGIONS: [[u32; 2]; 2] = [
 
 /// Makes only the bootloader's code executable. To be called from code in RAM.
 pub(super) fn begin() {
-    // SAFETY: nobody else uses the unit, and the running code lies in the second region.
+    // SAFETY: no other code uses the unit, and the running code lies in the second region.
     let mpu = unsafe { &*MPU::PTR };
     let [[first, of_first], [second, of_second]] = REGIONS;
     // SAFETY: the unit is off, so the regions have no effect yet.

@@ -27,7 +27,7 @@ use super::stream;
 use crate::losses::{Event, Losses};
 
 /// ICxF of all three inputs: eight equal samples at a quarter of 72 MHz, so pulses of less than 444 ns are suppressed
-/// as noise (RM0390, 17.4.7). 8,000 lines at 6000 rpm have 625 ns between two edges, which leaves 29 % of it for errors of
+/// as noise (RM0390, 17.4.7). 8,000 lines at 6000 rpm have 625 ns between two edges, with a margin of 29 % for errors of
 /// the duty cycle and the phase. Index and phases have the same delay.
 const FILTER: u8 = 0b0111;
 

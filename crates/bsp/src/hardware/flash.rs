@@ -59,7 +59,7 @@ impl Flash {
     /// Copies bytes from flash, fast for a few bytes such as a word.
     pub(super) fn read(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
-        // SAFETY: all bytes lie in flash, which is always readable, and nobody programs it during the call, because
+        // SAFETY: all bytes lie in flash, which is always readable, and it is not programmed during the call, because
         // programming needs this value too.
         let there = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
         bytes.iter_mut().zip(there).for_each(|(to, from)| *to = *from);
@@ -69,7 +69,7 @@ impl Flash {
     /// Copies bytes from flash, faster than `read` for many bytes and slower for a few.
     pub(super) fn read_many(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
-        // SAFETY: all bytes lie in flash, which is always readable, and nobody programs it during the call, because
+        // SAFETY: all bytes lie in flash, which is always readable, and it is not programmed during the call, because
         // programming needs this value too. The destination is in RAM.
         unsafe { core::ptr::copy_nonoverlapping(address as *const u8, bytes.as_mut_ptr(), bytes.len()) };
         Ok(())
@@ -85,7 +85,7 @@ impl Flash {
         Ok(())
     }
 
-    /// Programs one word and waits for the end: 16 us, at most 100 us. Code in flash stands still during this time.
+    /// Programs one word and waits for the end: 16 us, at most 100 us. Code in flash stalls during this time.
     ///
     /// `address` must be in flash, outside of the program, and a multiple of four.
     fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {

@@ -50,7 +50,7 @@ impl FrontEnd {
         self.sampling.start();
     }
 
-    /// The millisecond that has just ended; `None` if there is none. To be called at each interrupt, and also by a task
+    /// The millisecond that has just ended; `None` if none has ended. To be called at each interrupt, and also by a task
     /// that has not seen an interrupt for some milliseconds. After two calls in a row without a millisecond, everything
     /// is restarted; a single one proves nothing, because the interrupt may just have come.
     pub fn take(&mut self) -> Option<Reading> {

@@ -150,7 +150,7 @@ impl Sampling {
         prepare_adc(&self.adc);
     }
 
-    /// The sums of the millisecond that has just ended; `None` if there is none.
+    /// The sums of the millisecond that has just ended; `None` if none has ended.
     pub(super) fn take(&mut self) -> Option<Sums> {
         let flags = self.dma.lisr().read();
         forget_flags(&self.dma);

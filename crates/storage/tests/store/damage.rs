@@ -44,7 +44,7 @@ impl Device {
         ])
     }
 
-    /// The same device with so many more saves that the last ones are in the other page; the old page is not erased
+    /// The same device with enough further saves that the last ones are in the other page; the old page is not erased
     /// yet.
     fn just_moved() -> Device {
         let Device { mut saves, .. } = Device::on_one_page();
@@ -191,7 +191,7 @@ fn a_flipped_bit_between_the_records_costs_nothing() {
 }
 
 #[test]
-fn a_damaged_first_save_of_the_only_page_costs_only_what_no_later_save_holds() {
+fn a_damaged_first_save_of_the_only_page_loses_only_groups_without_a_later_save() {
     let device = Device::new(Device::on_one_page().saves[..2].to_vec());
     let health = device.check(true, |flash| flash.disturb(24, |byte| byte ^ 1));
     assert_eq!(health, [Health::Lost, Health::Good, Health::Good, Health::Good]);
@@ -287,7 +287,7 @@ fn a_length_that_leads_out_of_the_page_is_damage() {
 }
 
 #[test]
-fn what_the_start_has_found_is_told_after_it_was_mended_too() {
+fn damage_found_at_the_start_is_reported_after_its_repair() {
     let device = Device::new(Device::on_one_page().saves[..2].to_vec());
     let mut flash = device.flash.clone();
     flash.disturb(24, |byte| byte ^ 1);
@@ -298,7 +298,7 @@ fn what_the_start_has_found_is_told_after_it_was_mended_too() {
 }
 
 #[test]
-fn the_closing_mark_of_a_move_is_not_needed_once_the_old_page_says_that_it_was_left() {
+fn the_closing_mark_of_a_move_is_not_needed_after_the_old_page_is_marked_as_left() {
     let device = Device::just_moved();
     let bytes = device.flash.bytes();
     let words = usize::from(u16::from_le_bytes([bytes[512 + 12], bytes[512 + 13]]) & 0xFFF);

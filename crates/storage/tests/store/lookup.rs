@@ -43,7 +43,7 @@ fn it_is_the_one_that_was_saved_last() {
 
 /// After a cut, the bootloader finds the same record as the store, once the store has started.
 #[test]
-fn after_a_cut_it_is_the_old_or_the_new_one_and_what_the_store_says_later() {
+fn after_a_cut_a_lookup_finds_the_old_or_the_new_value_as_the_store_does() {
     let mut cuts = 0;
     for before in 1..20 {
         for weak in Weak::ALL {

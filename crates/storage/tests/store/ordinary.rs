@@ -12,7 +12,7 @@ fn application(value: &[u8]) -> [Change<'_>; 1] {
 }
 
 #[test]
-fn a_value_comes_back_with_its_version_and_an_empty_value_is_not_none() {
+fn a_value_is_read_with_its_version_and_an_empty_value_is_a_value() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let mut store = start(&mut flash, PAGES).unwrap();
     let value = [1, 2, 3, 4, 5];
@@ -129,7 +129,7 @@ fn saves_left_succeed_without_an_erase_with_device_records_between_them() {
 
 /// A save reads only its own transaction again.
 #[test]
-fn after_every_save_the_store_knows_what_a_start_would_read() {
+fn after_every_save_the_store_agrees_with_a_start() {
     let mut random = fastrand::Rng::with_seed(5);
     let mut flash = MockFlash::<1024, 4>::new(2048, 0);
     let pages = Pages::new(0, 1024);
@@ -184,7 +184,7 @@ fn a_start_without_erases_keeps_everything_and_room_is_made_later() {
 }
 
 #[test]
-fn what_could_never_be_moved_is_refused_while_there_is_room() {
+fn a_set_too_large_for_a_page_is_refused_while_there_is_room() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let mut store = start(&mut flash, PAGES).unwrap();
     store.save(&application(&noise(1, 200))).unwrap();
@@ -334,7 +334,7 @@ fn a_worn_out_word_fails_the_save_and_nothing_else() {
 }
 
 #[test]
-fn what_is_stored_already_wears_out_nothing() {
+fn an_unchanged_save_programs_nothing() {
     let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let both = vec![set(GroupNumber::Two, 1, 7), restore(GroupNumber::Three), set(GroupNumber::One, 1, 4)];
     start(&mut flash, PAGES).unwrap().save(&as_changes(&both)).unwrap();

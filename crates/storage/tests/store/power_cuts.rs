@@ -78,7 +78,7 @@ fn cut_everywhere<const WORD: usize>(mut check: impl FnMut(Flash<WORD>, Vec<Mode
     total
 }
 
-fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on<const WORD: usize>() {
+fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saves_continue<const WORD: usize>() {
     let mut news = 0;
     let total = cut_everywhere::<WORD>(|mut flash, allowed| {
         let model = recover(&mut flash, pages(WORD), &allowed);
@@ -130,8 +130,8 @@ mod words_of_four_bytes {
     }
 
     #[test]
-    fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on() {
-        super::a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on::<4>();
+    fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saves_continue() {
+        super::a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saves_continue::<4>();
     }
 
     #[test]
@@ -153,8 +153,8 @@ mod words_of_eight_bytes {
     }
 
     #[test]
-    fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on() {
-        super::a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on::<8>();
+    fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saves_continue() {
+        super::a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saves_continue::<8>();
     }
 
     #[test]

@@ -144,7 +144,7 @@ fn a_machine_is_stopped_by_the_holder_of_the_key_alone_and_its_bootloader_is_ope
 
 /// A recorded response does not open the node again: not at once, not after a reset, not after a power cycle.
 #[test]
-fn what_was_heard_on_the_bus_opens_nothing_later() {
+fn a_replayed_response_opens_nothing() {
     let mut bench = running();
     let mut heard = Vec::new();
     for round in 0..6 {
@@ -202,7 +202,7 @@ fn nodectl_updates_with_the_key_and_not_without() {
 }
 
 #[test]
-fn a_bootloader_without_a_key_asks_nobody() {
+fn a_bootloader_without_a_key_needs_no_response() {
     let mut bench = Bench::running();
     assert_eq!((state(&mut bench), challenge(&mut bench)), (NO_KEY, [0; 8]));
     assert_eq!(answer(&mut bench, [0; 8]), Err(refused(Abort::DeviceState)));

@@ -68,7 +68,7 @@ fn it_sends_a_heartbeat_and_obeys_nmt() {
 }
 
 #[test]
-fn lss_moves_it_until_the_next_start() {
+fn lss_changes_the_node_id_until_the_next_start() {
     let mut bench = in_bootloader();
     let master = Master::join(&mut bench.world);
     let lss = |bench: &mut Bench, request: [u8; 8]| master.lss(&mut bench.world, &request);
@@ -114,7 +114,7 @@ fn a_node_that_has_found_the_bit_rate_keeps_it() {
 }
 
 #[test]
-fn commands_that_it_does_not_know_or_cannot_do_now_are_refused() {
+fn unknown_commands_and_commands_in_a_wrong_state_are_refused() {
     let mut bench = in_bootloader();
     for command in [4, 0x7F, 0x80, 0xFF] {
         assert_eq!(bench.command(command), Err(INVALID_VALUE), "{command:02X}h");

@@ -123,9 +123,9 @@ fn is_found(bench: &mut Bench) -> bool {
     (0..20).any(|_| bench.read(DEVICE_TYPE) == Ok(BOOT.to_vec()))
 }
 
-/// The neighbour goes on sending frames, and no bus error occurs.
+/// The neighbour continues to send frames, and no bus error occurs.
 #[test]
-fn a_damaged_board_does_not_disturb_its_neighbour_and_an_update_brings_it_back() {
+fn a_damaged_board_does_not_disturb_its_neighbour_and_an_update_repairs_it() {
     for (index, kbit) in [500, 1000].into_iter().enumerate() {
         let damages = Damage::ALL.into_iter().filter(|damage| !damage.is_lost());
         // All kinds at both bit rates in a thorough run, otherwise every other kind at each.
@@ -155,7 +155,7 @@ fn a_damaged_board_does_not_disturb_its_neighbour_and_an_update_brings_it_back()
     }
 }
 
-/// The bootloader goes on the bus, refuses the image that waits to be copied, and resets: its boot-up message is complete.
+/// The bootloader joins the bus, refuses the image that waits to be copied, and resets: its boot-up message is complete.
 #[test]
 fn a_staged_image_that_is_refused_costs_no_frame() {
     for kbit in [10, 20, 50, 125, 250, 500, 1000] {

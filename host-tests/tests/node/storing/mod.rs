@@ -203,7 +203,7 @@ impl Master {
             if is_refused || self.board.has_response() || self.board.chip.is_down() {
                 break;
             }
-            // The client goes on: only the last request is answered.
+            // The client continues: only the last request is answered.
             place = if self.rng.bool() { place } else { self.rng.usize(..self.all.len()) };
             is_refused = self.request(place).is_err();
         }
@@ -222,7 +222,7 @@ impl Master {
         if self.board.chip.is_down() {
             self.restart(true);
         } else if self.rng.u8(..50) == 0 {
-            // So that the budget of erases is not used up.
+            // Without these pauses the budget of erases would be used up.
             self.board.wait(Duration::from_millis(20 * 60_000));
         }
     }

@@ -17,9 +17,9 @@ pub struct Step {
     pub number: usize,
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it shows.
+    /// The property that it shows.
     pub about: &'static str,
-    /// What to do when the step cannot go on.
+    /// The remedy when the step cannot continue.
     pub remedy: &'static str,
     /// Makes the checks.
     pub run: fn(&mut Bench<'_>) -> Result<()>,

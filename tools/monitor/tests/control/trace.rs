@@ -10,7 +10,7 @@ pub(crate) const NODE: u8 = 5;
 /// The time of a frame of eight bytes, in us.
 const FRAME: u64 = 500;
 
-/// What a monitor can be fed with.
+/// An input of a monitor.
 #[derive(Clone, Debug)]
 pub(crate) enum Event {
     Frame(Instant, Sender, Frame),
@@ -213,7 +213,7 @@ impl Trace {
         self.events.push(Event::Frame(Instant(at), sender, Frame::new(id, data).expect("a frame")));
     }
 
-    /// A request of the client and the answer of node 5, one frame later each; an empty answer is none.
+    /// A request of the client and the answer of node 5, one frame later each; an empty answer means no answer.
     pub(crate) fn ask(&mut self, request: &[u8], answer: &[u8]) {
         self.now += FRAME;
         self.client(self.now, 0x605, request);

@@ -68,7 +68,7 @@ pub(super) struct Slcan {
     frames: VecDeque<Frame>,
     /// The time of one frame on the bus.
     frame_time: Duration,
-    /// When the bus has carried all frames at the latest, if nobody else sends.
+    /// The latest time at which the bus has carried all frames, if no other node sends.
     sent_at: Instant,
 }
 
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_base_frame_is_passed_over() {
+    fn frames_other_than_base_frames_are_ignored() {
         for text in ["T000001230\r", "t8000\r", "t1239\r", "t12311\r", "t123\r", "t1231+1\r", "\u{e9}t1230\r"]
         {
             assert_eq!(frames(text), [], "{text}");

@@ -68,7 +68,7 @@ pub(super) struct Socketcand {
 }
 
 impl Socketcand {
-    /// Connects to a daemon and opens a bus of it.
+    /// Connects to a daemon and opens one of its buses.
     pub(super) fn connect(host: impl ToSocketAddrs, bus: &str) -> io::Result<Socketcand> {
         let stream = Stream::connect(host)?;
         let mut this = Socketcand { stream, splitter: Splitter::default(), messages: VecDeque::new() };
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_base_frame_is_passed_over() {
+    fn frames_other_than_base_frames_are_ignored() {
         for text in [
             "< frame 00000123 1.0 01 >",
             "< frame 800 1.0 01 >",

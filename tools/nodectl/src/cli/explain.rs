@@ -19,7 +19,7 @@ pub(super) struct Explain {
     code: Option<String>,
 }
 
-/// What a code means.
+/// The meaning of a code.
 #[derive(Serialize)]
 struct Meaning {
     code: String,

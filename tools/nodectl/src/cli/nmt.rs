@@ -22,7 +22,7 @@ const BOOT: Duration = Duration::from_millis(10_000);
 pub(super) struct Nmt {
     command: Command,
 
-    /// Do not wait until a node that is reset has booted, or a heartbeat tells the new state.
+    /// Do not wait until a node that is reset has booted, or a heartbeat has the new state.
     #[arg(long)]
     no_wait: bool,
 }

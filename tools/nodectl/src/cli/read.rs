@@ -24,12 +24,12 @@ const NO_DATA: AbortCode = AbortCode(0x0800_0024);
 /// Reads objects.
 #[derive(Debug, Args)]
 pub(super) struct Read {
-    /// Objects by index (1018:1, 0x1018sub1), by name ("Producer heartbeat time") or by words of it in any order. A record
+    /// Objects by index (1018:1, 0x1018sub1), by name ("Producer heartbeat time") or by words of the name in any order. A record
     /// or an array without a sub-index is read as a whole.
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
 
-    /// Their data type, where no data sheet tells it: UNSIGNED32 or u32, REAL32 or r32 ...
+    /// Their data type, where no data sheet has it: UNSIGNED32 or u32, REAL32 or r32 ...
     #[arg(long = "type", value_name = "TYPE", value_parser = parse_type)]
     data_type: Option<DataType>,
 

@@ -48,7 +48,7 @@ pub(super) struct Rules {
     #[arg(long, value_name = "RULE", value_delimiter = ',', value_parser = rule)]
     without: Vec<Rule>,
 
-    /// End after so many seconds.
+    /// End after this number of seconds.
     #[arg(long = "for", value_name = "SECONDS")]
     seconds: Option<u32>,
 

@@ -51,7 +51,7 @@ impl Sheets {
         match self {
             Sheets::None => None,
             Sheets::File(sheet) => Some(sheet.as_ref()).filter(|sheet| fits(sheet, device)),
-            // Of several revisions, the newest.
+            // The newest of several revisions.
             Sheets::Folder(sheets) => {
                 let fitting = sheets.iter().filter(|sheet| is_named(sheet) && fits(sheet, device));
                 fitting.max_by_key(|sheet| sheet.device.revision_number)

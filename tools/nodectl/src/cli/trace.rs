@@ -52,11 +52,11 @@ pub(super) struct Trace {
     #[arg(long)]
     silent: bool,
 
-    /// End after so many lines.
+    /// End after this number of lines.
     #[arg(long, value_name = "N")]
     count: Option<usize>,
 
-    /// End after so many seconds.
+    /// End after this number of seconds.
     #[arg(long = "for", value_name = "SECONDS")]
     seconds: Option<u32>,
 }

@@ -25,7 +25,7 @@ pub(super) struct Write {
     #[arg(required_unless_present = "file", conflicts_with = "file", allow_hyphen_values = true)]
     value: Option<String>,
 
-    /// Its data type, where no data sheet tells it: UNSIGNED32 or u32, REAL32 or r32 ...
+    /// Its data type, where no data sheet has it: UNSIGNED32 or u32, REAL32 or r32 ...
     #[arg(long = "type", value_name = "TYPE", value_parser = parse_type)]
     data_type: Option<DataType>,
 

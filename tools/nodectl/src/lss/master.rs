@@ -104,7 +104,7 @@ impl<'n> Master<'n> {
         Ok(self.network.send(&lss::activate_bit_rate(delay))?)
     }
 
-    /// Finds a slave without a node-ID, and selects it; `None` when there is none. Takes up to 133 times the time-out.
+    /// Finds a slave without a node-ID, and selects it; `None` without such a slave. Takes up to 133 times the time-out.
     ///
     /// `progress` is called with the number of questions asked, out of [`Fastscan::QUESTIONS`].
     ///

@@ -79,7 +79,7 @@ impl Transfers {
         self.0.contains_key(&node)
     }
 
-    /// Takes a request to a server, or a response of it. Returns the transfers that have ended.
+    /// Takes a request to a server, or its response. Returns the transfers that have ended.
     pub(crate) fn on_frame(&mut self, node: NodeId, frame: &Frame, at: Instant) -> Vec<Transferred> {
         let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { return Vec::new() };
         let is_request = frame.id() >= 0x600;

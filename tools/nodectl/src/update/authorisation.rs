@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_key_is_64_digits_and_what_an_editor_leaves_around_them() {
+    fn a_key_is_64_digits_with_the_blanks_of_an_editor() {
         let digits = "0F".repeat(32);
         assert_eq!(format!("{digits}\n").parse::<AuthorisationKey>().unwrap().0, [0x0F; 32]);
         for wrong in ["", &digits[1..], &format!("{digits}00"), &digits.replace('F', "G"), "\u{fc}"] {

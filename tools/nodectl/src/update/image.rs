@@ -28,7 +28,7 @@ pub enum ImageError {
     Checksum,
 }
 
-/// The new program, as it is downloaded.
+/// The downloaded bytes of the new program.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// The content of the file.
@@ -107,13 +107,13 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_image_tells_what_it_is() {
+    fn a_complete_image_has_an_identification() {
         let info = Image::parse(file()).unwrap().info.unwrap();
         assert_eq!((info.board, info.version), (1, VERSION));
     }
 
     #[test]
-    fn anything_else_is_told_before_it_gets_on_the_bus() {
+    fn other_files_are_rejected_before_they_reach_the_bus() {
         let mut wrong = file();
         wrong[600] ^= 1;
         assert_eq!(Image::parse(wrong).unwrap_err(), ImageError::Checksum);

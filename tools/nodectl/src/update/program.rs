@@ -97,7 +97,7 @@ impl<'n> Program<'n> {
         Ok(self.word(STATUS)?.map(Status::from_word))
     }
 
-    /// Whether the running program is on trial: without a confirmation the former program comes back. Only for nodes of
+    /// Whether the running program is on trial: without a confirmation the former program is restored. Only for nodes of
     /// this project.
     ///
     /// # Errors

@@ -148,7 +148,7 @@ fn every_parameter_survives_dump_and_apply_on_boards_of_every_node_id_and_the_wa
                 assert_eq!(different(&wanted, &fresh.values()), [""; 0], "{context} to {other}");
                 assert_eq!(fresh.run(&["diff", &configured]), "", "{context} to {other}");
             }
-            // And the way back.
+            // In the other direction.
             board.run(&["apply", &factory, "--save"]);
             board.run(&["nmt", "reset"]);
             assert_eq!(different(&defaults, &board.values()), [""; 0], "{context} back");
@@ -185,7 +185,7 @@ fn a_cob_id_that_follows_the_node_id_is_dumped_as_a_formula() {
 
 /// Commands and what makes the device act are in no file, and a file with values for them does not write them.
 #[test]
-fn what_acts_is_neither_dumped_nor_applied() {
+fn commands_are_neither_dumped_nor_applied() {
     for personality in PERSONALITIES {
         let (board, file) = (Board::new(personality, 5), path(&format!("acts-{personality:?}")));
         board.run(&["dump", "--all", &file]);
@@ -208,9 +208,9 @@ fn what_acts_is_neither_dumped_nor_applied() {
     }
 }
 
-/// A value that a node does not take is told with the value that it has and the reason; all others are written.
+/// A value that a node rejects is reported with the present value and the reason; all others are written.
 #[test]
-fn apply_says_what_differs_and_why() {
+fn apply_reports_differences_with_their_reason() {
     for personality in PERSONALITIES {
         let (board, file) = (Board::new(personality, 5), path(&format!("refused-{personality:?}")));
         board.run(&["write", "1017", "777"]);

@@ -109,7 +109,7 @@ fn failures_and_their_exit_codes() {
 }
 
 #[test]
-fn scan_finds_who_answers() {
+fn scan_finds_answering_nodes() {
     let wire = Wire::new(vec![Pressure::new(1), Pressure::new(77)]);
     let lines = printed(&wire, &["scan"]);
     let rows: Vec<&str> = lines.lines().collect();
@@ -122,7 +122,7 @@ fn scan_finds_who_answers() {
 }
 
 #[test]
-fn info_tells_what_a_node_is() {
+fn info_shows_the_identity_of_a_node() {
     let wire = Wire::new(Pressure::new(1));
     let value: serde_json::Value = serde_json::from_str(&printed(&wire, &["info", "--json"])).unwrap();
     assert_eq!(value["software_version"], "1.2.3");
@@ -133,7 +133,7 @@ fn info_tells_what_a_node_is() {
 }
 
 #[test]
-fn nmt_waits_for_what_it_asked_for() {
+fn nmt_waits_for_the_requested_state() {
     let wire = Wire::new(Pressure::new(1));
     assert_eq!(printed(&wire, &["nmt", "start"]), "node 1: operational\n");
     assert_eq!(printed(&wire, &["nmt", "stop"]), "node 1: stopped\n");
@@ -277,7 +277,7 @@ fn a_recording_as_a_stream_of_arrow_has_the_rows_of_the_table_with_types() {
 }
 
 #[test]
-fn update_tells_what_was_there_and_what_is() {
+fn update_reports_the_old_and_the_new_program() {
     let wire = Wire::new(vec![Loader::new(3, b"1.0.0\n"), Loader::new(4, b"1.0.0\n")]);
     let path = format!("{}/program.bin", env!("CARGO_TARGET_TMPDIR"));
     std::fs::write(&path, b"1.1.0\nnew").unwrap();

@@ -121,7 +121,7 @@ fn a_mapping_is_made_in_one_command() {
 }
 
 #[test]
-fn objects_are_listed_with_what_is_known_of_them() {
+fn objects_are_listed_with_their_data_sheet() {
     let wire = Wire::new(Pressure::new(1));
     let lines = printed(&wire, &["list", "heartbeat"]);
     assert!(lines.contains("1017h:0   rw    UNSIGNED16"), "{lines}");

@@ -105,7 +105,7 @@ const COMMANDS: [&[&str]; 5] =
     [&["info"], &["read", "1000"], &["monitor"], &["dump"], &["write", "1017", "1"]];
 
 #[test]
-fn every_command_says_what_to_do_about_a_silent_node() {
+fn every_command_has_a_hint_for_a_silent_node() {
     for line in COMMANDS {
         let wire = Wire::new(vec![Pressure::new(1)]);
         let (code, text) = failed(&wire, &[line, &["-n", "9"]].concat());
@@ -203,7 +203,7 @@ fn a_closed_pipe_ends_a_command_without_a_word() {
         drop(child.stdout.take());
         let output = child.wait_with_output().expect("an end");
         assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(0), ""));
-        // Nobody reads anything.
+        // The reader is gone.
         let mut child = Command::cargo_bin("nodectl")
             .expect("the program")
             .args(["--bus", "socketcand://127.0.0.1:1/vcan0", "scan"])

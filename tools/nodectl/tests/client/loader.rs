@@ -69,7 +69,7 @@ pub(crate) struct Flash {
     /// Whether new programs are on trial, and whether the present program is.
     pub(crate) has_trials: bool,
     pub(crate) is_on_trial: bool,
-    /// The program that comes back when another one is started.
+    /// The program that runs after a rollback.
     pub(crate) takes_back: Option<Vec<u8>>,
     /// The key that authorises a change of the program, and the state of the challenge since this start.
     key: Option<[u8; 32]>,
@@ -204,7 +204,7 @@ impl Loader {
         self.device.application_mut()
     }
 
-    /// Switches the node off until an instant. An erased or half written flash stays as it is.
+    /// Switches the node off until an instant. An erased or half written flash is not changed.
     pub(crate) fn switch_off(&mut self, until: Instant) {
         let runs = self.flash().runs;
         self.flash().challenge(false);

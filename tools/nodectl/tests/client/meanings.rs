@@ -10,7 +10,7 @@ fn json(line: &str) -> serde_json::Value {
     serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"))
 }
 
-/// 6132h tells the position of the decimal point: 250 with two digits is 2.50 bar and not 250.
+/// 6132h is the position of the decimal point: 250 with two digits is 2.50 bar and not 250.
 #[test]
 fn an_integer_with_a_unit_has_its_point() {
     for (personality, first) in [(Personality::Pressure, 0x6000_u16), (Personality::Combined, 0x6800)] {
@@ -100,7 +100,7 @@ fn names_are_found_by_words_and_near_misses_are_suggested() {
 }
 
 #[test]
-fn a_refusal_says_what_helps() {
+fn a_refusal_has_a_hint() {
     let wire = Wire::new(Pressure::new(1));
     assert!(failed(&wire, &["write", "1019", "250"]).1.ends_with("value too high; it takes 0 to 240"));
     let (_, text) = failed(&wire, &["write", "1A00:0", "3"]);

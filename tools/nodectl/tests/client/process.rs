@@ -110,7 +110,7 @@ fn a_socketcand_daemon_is_a_bus() {
 
 /// For a wrong scheme with the right port, the error names the right scheme.
 #[test]
-fn slcan_at_a_socketcand_daemon_is_told() {
+fn slcan_at_a_socketcand_daemon_is_reported() {
     let address = daemon().replace("socketcand", "slcan").replace("/vcan0", "");
     let (code, _, error) = nodectl(&address, &["scan"]);
     assert_eq!(code, 4);

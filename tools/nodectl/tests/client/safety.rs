@@ -68,7 +68,7 @@ fn the_only_node_needs_no_name() {
 }
 
 #[test]
-fn nobody_is_no_success() {
+fn a_command_without_a_node_does_not_succeed() {
     let nobody = || Wire::new(Vec::<Pressure>::new());
     for line in [
         &["scan"][..],
@@ -151,7 +151,7 @@ fn evil(serial: u32) -> Wire<Pressure> {
 }
 
 #[test]
-fn what_a_device_says_does_not_reach_the_terminal_as_it_is() {
+fn control_characters_of_a_device_do_not_reach_the_terminal() {
     for line in [&["read", "1008"][..], &["scan"], &["info"]] {
         let text = printed(&evil(1), line);
         assert!(text.contains("\\x1b]0;x\\x07\\r\\n"), "{text:?}");
@@ -163,7 +163,7 @@ fn what_a_device_says_does_not_reach_the_terminal_as_it_is() {
 }
 
 #[test]
-fn what_a_data_sheet_says_does_not_reach_the_terminal_as_it_is() {
+fn control_characters_of_a_data_sheet_do_not_reach_the_terminal() {
     let file = path("evil.eds");
     std::fs::write(&file, "[1017]\nParameterName=a\u{1b}[2Jb\nDataType=6\nAccessType=rw\n").unwrap();
     let wire = Wire::new(Pressure::new(1));
@@ -201,7 +201,7 @@ fn a_file_stays_until_its_replacement_is_complete() {
 }
 
 #[test]
-fn a_plot_that_cannot_be_written_is_told_before_the_recording() {
+fn a_plot_that_cannot_be_written_is_reported_before_the_recording() {
     let wire = Wire::new(Pressure::new(1));
     let before = wire.network().now();
     let (code, _) = failed(&wire, &["record", "--start", "--for", "100", "--svg", "/nowhere/plot.svg"]);

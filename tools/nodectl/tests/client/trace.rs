@@ -69,7 +69,7 @@ fn services_in_words() {
 }
 
 #[test]
-fn a_heartbeat_is_told_when_its_state_is_new() {
+fn a_heartbeat_is_printed_when_its_state_is_new() {
     let beats: Vec<(u16, &[u8])> = vec![
         (0x705, &[0]),
         (0x705, &[0x7F]),
@@ -142,7 +142,7 @@ fn a_transfer_is_one_line() {
 
 /// A block download with a lost segment that is repeated: 20 bytes in three segments.
 #[test]
-fn blocks_are_folded_and_what_came_twice_counts_once() {
+fn blocks_are_folded_and_repeated_segments_count_once() {
     let segment = |number: u8| {
         let mut segment = [number; 8];
         segment[0] = number;

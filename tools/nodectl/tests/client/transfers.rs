@@ -73,7 +73,7 @@ fn one_lost_frame_in_any_place_does_no_harm() {
 }
 
 #[test]
-fn a_broken_bus_is_told_and_can_be_opened_again() {
+fn a_broken_bus_is_reported_and_can_be_opened_again() {
     let wire = Wire::new(Pressure::new(5));
     let mut network = wire.network();
     wire.disturb(|frame| if frame.id() == 0x605 { Fate::BreaksTheBus } else { Fate::Arrives });

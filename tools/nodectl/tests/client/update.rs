@@ -111,7 +111,7 @@ fn with_key() -> Options {
 }
 
 #[test]
-fn the_holder_of_its_key_updates_a_node_that_asks_for_it_and_confirms() {
+fn the_key_holder_updates_and_confirms_a_guarded_node() {
     let (wire, mut diary) = (fleet(&[3]), Diary::default());
     wire.station(|loaders| {
         loaders[0].set_key(KEY);
@@ -176,7 +176,7 @@ fn an_image_that_says_nothing_of_itself() {
 }
 
 #[test]
-fn a_node_that_has_it_is_left_alone_unless_forced() {
+fn a_node_with_the_same_program_is_updated_only_by_force() {
     let (wire, mut diary) = (fleet(&[3]), Diary::default());
     let outcome = one(&wire, &image(OLD), &options(), &mut diary).unwrap();
     assert!(!outcome.is_changed);
@@ -188,7 +188,7 @@ fn a_node_that_has_it_is_left_alone_unless_forced() {
 }
 
 #[test]
-fn what_would_do_harm_is_refused_before_anything_is_erased() {
+fn unsuitable_images_are_refused_before_any_erase() {
     let wire = fleet(&[3]);
     let mut other = image(NEW);
     other.info.as_mut().unwrap().board = 43;
@@ -216,7 +216,7 @@ fn a_node_without_blocks_gets_segments() {
 }
 
 #[test]
-fn a_program_that_the_node_does_not_like_is_told_in_words() {
+fn a_refused_program_is_reported_in_words() {
     for (word, words) in [
         (0x0006, "format or CRC error"),
         (0x000E, "the flash is secured"),

@@ -7,7 +7,7 @@ use super::html::escaped;
 use crate::check::{Result, Run, Verdict};
 
 /// A test suite with a test case for each check. A deviation from a recommended rule is no failure; the output of the
-/// test case tells it.
+/// test case names the reason.
 #[must_use]
 pub fn junit(run: &Run) -> String {
     let seconds = |time: u64| format!("{}.{:03}", time / 1_000_000, time / 1000 % 1000);

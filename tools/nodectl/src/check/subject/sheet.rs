@@ -6,7 +6,7 @@ use super::Subject;
 use super::verdict::{Outcome, skip};
 
 impl Subject<'_> {
-    /// The data sheet; skipped where there is none.
+    /// The data sheet; skipped without a data sheet.
     pub(in crate::check) fn sheet(&self) -> Outcome<Eds> {
         self.setup.sheet.clone().ok_or_else(|| skip("no data sheet: give it with --eds"))
     }
@@ -16,7 +16,7 @@ impl Subject<'_> {
         Ok(self.sheet()?.entries().filter(|entry| is_wanted(entry)).cloned().collect())
     }
 
-    /// The first entry of the data sheet that fulfils a condition; skipped where there is none.
+    /// The first entry of the data sheet that fulfils a condition; skipped without such an entry.
     pub(in crate::check) fn entry(&self, what: &str, is_wanted: impl Fn(&Entry) -> bool) -> Outcome<Entry> {
         let sheet = self.sheet()?;
         sheet

@@ -20,7 +20,7 @@ pub(super) struct Scan {
     /// How long each of the 133 steps may take, in milliseconds; a tenth of --timeout if it is left out.
     #[arg(long, value_name = "MS")]
     step: Option<u32>,
-    /// Give the nodes node-IDs from this one on, without those in use; without it, all nodes are listed and stay as they are.
+    /// Give the nodes node-IDs from this one on, without those in use; without it, all nodes are listed and keep their node-IDs.
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     assign: Option<u8>,
     /// Make the nodes keep their node-IDs.

@@ -32,7 +32,7 @@ pub(super) struct Monitor {
     #[command(flatten)]
     source: Source,
 
-    /// A line for each value in the pre-defined PDOs of a lift (CiA 417), whoever sends them; no node is asked.
+    /// A line for each value in the pre-defined PDOs of a lift (CiA 417), of any sender; no requests are sent.
     #[arg(long, conflicts_with_all = ["objects", "start", "window"])]
     lift: bool,
 
@@ -40,7 +40,7 @@ pub(super) struct Monitor {
     #[arg(long, conflicts_with = "lift")]
     changes: bool,
 
-    /// End after so many values.
+    /// End after this number of values.
     #[arg(long, value_name = "N")]
     count: Option<usize>,
 

@@ -1,4 +1,4 @@
-//! The first line of the screen: the state of the node, as far as it is known.
+//! The first line of the screen: the state of the node, where known.
 
 use ratatui::style::Stylize;
 use ratatui::text::{Line, Span};

@@ -203,7 +203,7 @@ mod tests {
         view
     }
 
-    /// The expected pictures are in files beside the tests; SCREENS=write writes them anew.
+    /// The expected pictures are in files beside the tests; SCREENS=write writes them.
     #[test]
     fn pictures_from_the_smallest_terminal_to_a_large_one() {
         let status = Status { emergency: Some("8130h heartbeat or life guarding error".into()), ..status() };
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_head_tells_the_node_and_the_foot_what_is_wrong() {
+    fn the_head_shows_the_node_and_the_foot_the_fault() {
         let status = Status { state: "stopped", hint: Some("the node is stopped".into()), ..status() };
         let picture = drawn(&view(), &status, 60, 10);
         assert!(picture[0].starts_with("node 1  stopped  51 frames/s"), "{picture:?}");
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_does_not_change() {
+    fn a_paused_plot_does_not_change() {
         let mut view = view();
         take(&mut view, 1, 1.0);
         view.hold();

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_axis_begins_with_the_first_frame_and_goes_on_with_another_adapter() {
+    fn the_axis_begins_with_the_first_frame_and_continues_with_another_adapter() {
         let mut time = BusTime::default();
         assert_eq!(time.now(Instant(7)), 0.0);
         assert_eq!(time.of_frame(Instant(5_000_000), Instant(0)), 0.0);

@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_mapping_is_followed_and_what_is_no_longer_sent_is_polled() {
+    fn a_new_mapping_is_followed_and_unmapped_signals_are_polled() {
         let mut live = Live::default();
         live.learn(node(), survey(&[(0x2000, 1, 8), (0x2000, 2, 8)]));
         live.want(BTreeSet::from([Key::new(node(), at(0x2000, 1)), Key::new(node(), at(0x2000, 2))]));

@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_the_number_of_the_request() {
+    fn errors_have_the_number_of_their_request() {
         for (text, id, words) in [
             ("", Json::Null, "no JSON"),
             ("[1]", Json::Null, ""),
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changes_something_is_known() {
+    fn writing_requests_are_known() {
         let writes = |text: &str| parse(text).unwrap().what.writes();
         assert!(writes(r#"{"id":1,"do":"nmt","node":"all","command":"start"}"#));
         assert!(writes(r#"{"id":1,"do":"stimulate","board":1,"kind":"pressure","spec":"const:1"}"#));

@@ -36,7 +36,7 @@ pub(super) fn parse(text: &str, head: &Head, last: Instant) -> Result<Option<(In
     Ok(None)
 }
 
-/// What follows the time: `1 701 Rx d 1 05`, `1 701 Rx r`, `1 ErrorFrame`, `CANFD 1 Rx 701 ..`, `Start of measurement`.
+/// The text behind the time: `1 701 Rx d 1 05`, `1 701 Rx r`, `1 ErrorFrame`, `CANFD 1 Rx 701 ..`, `Start of measurement`.
 fn record(words: &[&str], head: &Head) -> Result<Option<Record>, NotARecord> {
     match words {
         ["CANFD", _channel, _direction, id, ..] => {

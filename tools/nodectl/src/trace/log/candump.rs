@@ -23,7 +23,7 @@ pub(super) fn parse(line: &str) -> Result<(Instant, Record), NotARecord> {
     Ok((at, record))
 }
 
-/// The time in parentheses, in seconds or as a date (option -tA), and what follows; 0 where there is none.
+/// The time in parentheses, in seconds or as a date (option -tA), and the rest of the line; 0 without a time.
 fn time(line: &str) -> Result<(Instant, &str), NotARecord> {
     let Some(rest) = line.strip_prefix('(') else { return Ok((Instant(0), line)) };
     let (time, rest) = rest.split_once(')').ok_or(NotARecord)?;

@@ -28,7 +28,7 @@ fn good() -> Wire<Faulty> {
 }
 
 #[test]
-fn a_device_that_conforms_passes_and_is_told_so() {
+fn a_conforming_device_passes_with_a_report() {
     let eds = sheet("good.eds");
     let table = printed(&good(), &["--node", "5", "--eds", &eds, "check", "--yes", "--only", "SDO-0,nmt-01"]);
     assert!(
@@ -117,7 +117,7 @@ fn the_list_and_the_explanations_need_no_device() {
 }
 
 #[test]
-fn what_is_no_check_and_who_does_not_answer_is_told() {
+fn unknown_checks_and_silent_nodes_are_reported() {
     assert_eq!(
         failed(&good(), &["check", "--only", "SDO-999"]),
         (2, "no check is called \"SDO-999\": see --list".to_owned())

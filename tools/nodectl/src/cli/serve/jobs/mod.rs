@@ -62,7 +62,7 @@ pub(super) struct Means {
     pub(super) number: u64,
 }
 
-/// What earlier jobs have learned of the node of a job.
+/// Knowledge of earlier jobs about the node of a job.
 pub(super) struct Known {
     pub(super) node: NodeId,
     pub(super) channel: Channel,
@@ -154,7 +154,7 @@ impl Job {
     }
 }
 
-/// Begins a job. The pump is told the result in any case, also after a panic.
+/// Begins a job. The pump receives the result in any case, also after a panic.
 pub(super) fn begin(
     job: Job,
     number: u64,

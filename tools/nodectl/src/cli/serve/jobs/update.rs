@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_is_none_is_told_before_anything_is_asked() {
+    fn a_file_that_is_no_image_is_reported_before_any_request() {
         assert!(decode("%%%").is_err());
         for (bytes, words) in [(&b"\x7fELF"[..], "ELF"), (b"nothing", "512"), (b"", "512")] {
             assert!(parse(bytes.to_vec()).unwrap_err().contains(words));

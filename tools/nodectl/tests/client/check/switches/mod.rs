@@ -86,7 +86,7 @@ fn red(run: &Run) -> Vec<&'static str> {
 }
 
 #[test]
-fn every_switch_is_told_by_its_checks() {
+fn every_switch_fails_its_checks() {
     let mut wrong = Vec::new();
     for switch in all() {
         let (name, expected) = (switch.name, switch.red);
@@ -127,7 +127,7 @@ fn every_check() -> Vec<check::Check> {
 /// A switch has one fault only: it does not make most of the checks fail. A thorough run tries all checks with all
 /// switches.
 #[test]
-fn a_switch_is_told_by_few_checks() {
+fn a_switch_fails_few_checks() {
     if std::env::var("THOROUGH").is_ok_and(|value| value == "1") {
         for switch in all() {
             let name = switch.name;
