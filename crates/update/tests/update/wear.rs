@@ -71,7 +71,9 @@ impl Node {
 type Hostile = (&'static str, f64, fn(&mut Node, u32));
 
 const HOSTILE: [Hostile; 4] = [
-    ("1F51h = 3 again and again", ERASE, |node, _| drop(node.clear())),
+    ("1F51h = 3 again and again", ERASE, |node, _| {
+        let _ = node.clear();
+    }),
     ("1F51h = 3 and a byte of a download", ERASE, |node, _| {
         let _ = node.clear();
         node.begin();
