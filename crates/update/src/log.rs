@@ -214,8 +214,8 @@ impl Log {
     /// Adds an event, unless it is the newest already. The oldest of seventeen is dropped.
     pub fn add(&mut self, event: &Event) {
         if self.events().next().as_ref() != Some(event) {
-            self.0.rotate_right(EVENT);
-            self.0.iter_mut().zip(event.encode()).for_each(|(to, byte)| *to = byte);
+            let all = event.encode().into_iter().chain(self.0);
+            self.0.iter_mut().zip(all).for_each(|(to, byte)| *to = byte);
         }
     }
 }
