@@ -6,12 +6,12 @@ use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, ErrorClass, Part, Soundness};
 use profiles::communication::{
-    LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL,
+    LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL, UPDATE_LOG,
 };
 use profiles::fault::Flags;
 use profiles::lift::objects::{SWITCHED_OFF, UNKNOWN_CHOICES};
 use profiles::{AnyProfile, Snapshot};
-use update::{Authorisation, Programs};
+use update::{Authorisation, Log, Programs};
 
 use crate::Setup;
 use crate::configured::Configured;
@@ -42,6 +42,8 @@ pub(crate) struct NodeApplication {
     pub(crate) trial: ProgramTrial,
     /// The programs in the flash (2004h).
     pub(crate) programs: Programs,
+    /// The log of updates (2006h).
+    pub(crate) update_log: Log,
     /// Permission to change the program (2003h).
     pub(crate) authorisation: Authorisation,
     buffer: TransferBuffer,
@@ -60,6 +62,7 @@ impl NodeApplication {
             lost_events: [0; LOST_EVENTS],
             trial: ProgramTrial::default(),
             programs: Programs::default(),
+            update_log: Log::EMPTY,
             authorisation: Authorisation::default(),
             buffer: TransferBuffer::EMPTY,
         }
@@ -149,7 +152,7 @@ impl Application for NodeApplication {
         match entry.index() {
             PROGRAM_TRIAL => {
                 let is_at_work = self.has_measured();
-                self.trial.command(bytes, is_at_work)
+                self.trial.command(bytes, is_at_work, self.commander())
             }
             PROGRAM_AUTHORISATION => self.answer(bytes, image),
             _ => self.profile.write(entry, bytes, image),
@@ -235,8 +238,8 @@ impl Application for NodeApplication {
         self.admit(entry.index(), entry.sub())
     }
 
-    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
-        self.buffer.read()
+    fn read_domain(&self, at: Multiplexer) -> Result<&[u8], Abort> {
+        if at.index == UPDATE_LOG { Ok(self.update_log.bytes()) } else { self.buffer.read() }
     }
 
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {

@@ -118,17 +118,22 @@ impl Header {
     /// Properties of the image.
     #[must_use]
     pub fn description(&self) -> Description {
-        let number = self.word(VERSION);
         Description {
             board: self.board(),
             hardware: self.hardware(),
-            version: Version { major: low(number), minor: low(number >> 16), patch: low(self.word(PATCH)) },
+            version: self.version(),
             counter: self.counter(),
             keys: KeyList {
                 release: self.certificate(Rank::Release).map(Certificate::from_bytes),
                 root: self.certificate(Rank::Root).map(Certificate::from_bytes),
             },
         }
+    }
+
+    /// The version of the image.
+    pub(crate) fn version(&self) -> Version {
+        let number = self.word(VERSION);
+        Version { major: low(number), minor: low(number >> 16), patch: low(self.word(PATCH)) }
     }
 
     /// The board of the image.

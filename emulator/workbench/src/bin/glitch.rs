@@ -31,6 +31,9 @@ struct Cli {
     /// Number of register bits to flip at each instruction; a register has 32
     #[arg(long, default_value_t = 4)]
     flips: usize,
+    /// Two skips instead of one fault: the interval between sampled instructions, for the first and for the second
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pairs: Option<u16>,
 }
 
 fn main() -> ExitCode {
@@ -53,10 +56,14 @@ fn run(cli: &Cli) -> Result<()> {
         every_of_conditions: cli.every.into(),
         every_of_loops: cli.every_of_loops.into(),
         flips: cli.flips,
+        pairs: cli.pairs.map(usize::from),
         boards,
     };
-    let broken = |Violation { point, fault }: Violation| {
+    let broken = |Violation { point, fault, after }: Violation| {
         println!("  BROKEN by {fault}, visit {}: {}", point.visit, places.name(fault.address()));
+        if let Some(after) = after {
+            println!("    after {after}: {}", places.name(after.address()));
+        }
     };
     let takes = |address| {
         let name = places.name(address);
@@ -90,6 +97,9 @@ fn print(campaign: &Campaign, seconds: f64) {
         campaign.tried("register bits"),
         campaign.bits
     );
+    if campaign.tried("pairs of skips") > 0 {
+        println!("  {} pairs of skips", campaign.tried("pairs of skips"));
+    }
     for ((kind, what), count) in &campaign.outcomes {
         println!("  {count:>8} {kind}: {what}");
     }

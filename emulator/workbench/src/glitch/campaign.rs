@@ -23,6 +23,8 @@ pub struct Extent {
     pub every_of_loops: usize,
     /// Number of register bits that are flipped at each point, one after the other.
     pub flips: usize,
+    /// Sampling interval of both instructions of pairs of skips, outside of loops; without it, one fault at a time.
+    pub pairs: Option<usize>,
     /// Number of threads, each with its own board.
     pub boards: usize,
 }
@@ -46,6 +48,8 @@ pub struct Violation {
     pub point: Point,
     /// The injected fault.
     pub fault: Fault,
+    /// The skip before it, of a pair.
+    pub after: Option<Fault>,
 }
 
 /// Injected faults and their outcomes.
@@ -77,21 +81,29 @@ impl Campaign {
         ensure!(outcome == expected, "{}: without a fault the outcome is {outcome:?}", scene.name);
         let visits: Vec<Point> = visits.into_iter().filter(|point| (watcher.takes)(point.address)).collect();
         let (loops, rest): (Vec<Point>, Vec<Point>) = visits.iter().partition(|point| point.visit > OFTEN);
+        let seconds: Vec<Point> = rest.iter().map(|point| Point { visit: 1, ..*point }).collect();
         let conditions = conditions(&rig, &rest)?;
         let (conditions, rest): (Vec<Point>, Vec<Point>) =
             rest.iter().partition(|point| conditions.contains(&point.address));
-        let chosen = rest
-            .iter()
-            .step_by(extent.every)
-            .chain(conditions.iter().step_by(extent.every_of_conditions))
-            .chain(loops.iter().step_by(extent.every_of_loops));
-        let chosen: Vec<Point> = chosen.flat_map(ends).collect();
+        let chosen: Vec<Point> = if let Some(every) = extent.pairs {
+            seconds.iter().copied().step_by(every).collect()
+        } else {
+            let chosen = rest
+                .iter()
+                .step_by(extent.every)
+                .chain(conditions.iter().step_by(extent.every_of_conditions))
+                .chain(loops.iter().step_by(extent.every_of_loops));
+            chosen.flat_map(ends).collect()
+        };
         let undisturbed = rig.undisturbed;
         let shares = chosen.chunks(chosen.len().div_ceil(extent.boards.max(1)).max(1));
         let parts: Vec<Result<Campaign>> = thread::scope(|scope| {
             let boards: Vec<_> = shares
                 .map(|share| {
-                    scope.spawn(|| part(bootloader, scene, share, extent.flips, &undisturbed, watcher))
+                    scope.spawn(|| match extent.pairs {
+                        None => part(bootloader, scene, share, extent.flips, &undisturbed, watcher),
+                        Some(_) => pairs(bootloader, scene, [share, &chosen], &undisturbed, watcher),
+                    })
                 })
                 .collect();
             boards.into_iter().map(|board| board.join().map_err(|_| anyhow!("a board was lost"))?).collect()
@@ -124,16 +136,18 @@ impl Campaign {
         }
     }
 
-    fn note(&mut self, point: Point, fault: Fault, outcome: Outcome) {
+    fn note(&mut self, violation: Violation, outcome: Outcome, watcher: &Watcher<'_>) {
         let what = match outcome {
             Outcome::Broken => "broken",
             Outcome::Good => "the good application runs",
             Outcome::Stays => "the bootloader stays",
             Outcome::Nothing => "neither within 8 s",
         };
-        *self.outcomes.entry((fault.kind(), what)).or_default() += 1;
+        let kind = if violation.after.is_some() { "pairs of skips" } else { violation.fault.kind() };
+        *self.outcomes.entry((kind, what)).or_default() += 1;
         if outcome == Outcome::Broken {
-            self.violations.push(Violation { point, fault });
+            self.violations.push(violation);
+            (watcher.broken)(violation);
         }
     }
 }
@@ -178,11 +192,45 @@ fn part(
         campaign.bits += reads.iter().map(choice::possible).sum::<usize>();
         for fault in rig.skips().into_iter().chain(wrong_reads(&reads, point, flips)) {
             let outcome = rig.disturb(fault, scene.has_good)?;
-            campaign.note(point, fault, outcome);
-            if outcome == Outcome::Broken {
-                (watcher.broken)(Violation { point, fault });
-            }
+            campaign.note(Violation { point, fault, after: None }, outcome, watcher);
             rig.go_back(&moment)?;
+        }
+    }
+    Ok(campaign)
+}
+
+/// The share of one board of pairs: each skip at one of the first points, followed by a skip at each of the others that the
+/// program comes to afterwards, at the first visit.
+fn pairs(
+    bootloader: &[u8],
+    scene: &Scene,
+    [firsts, seconds]: [&[Point]; 2],
+    undisturbed: &[u8],
+    watcher: &Watcher<'_>,
+) -> Result<Campaign> {
+    let mut campaign = Campaign::default();
+    let mut rig = Rig::new(bootloader)?;
+    rig.undisturbed = undisturbed.to_vec();
+    for first in firsts {
+        rig.start(scene, vec![*first])?;
+        if rig.next(scene.has_good)?.is_none() {
+            continue;
+        }
+        let begin = rig.stop()?;
+        for after in rig.skips() {
+            rig.inject(after)?;
+            rig.watch(seconds)?;
+            while let Some(point) = rig.next(scene.has_good)? {
+                let moment = rig.stop()?;
+                campaign.points += 1;
+                for fault in rig.skips() {
+                    let outcome = rig.disturb(fault, scene.has_good)?;
+                    campaign.note(Violation { point, fault, after: Some(after) }, outcome, watcher);
+                    rig.go_back(&moment)?;
+                }
+            }
+            rig.stop()?;
+            rig.go_back(&begin)?;
         }
     }
     Ok(campaign)

@@ -149,8 +149,19 @@ impl Rig {
         code
     }
 
+    /// Stops at these points from here on.
+    pub(crate) fn watch(&mut self, stops: &[Point]) -> Result<()> {
+        Ok(self.machine.watch(stops.iter().copied())?)
+    }
+
     /// Injects the fault and runs to the outcome.
     pub(crate) fn disturb(&mut self, fault: Fault, has_good: bool) -> Result<Outcome> {
+        self.inject(fault)?;
+        Ok(self.final_outcome(has_good))
+    }
+
+    /// Injects the fault.
+    pub(crate) fn inject(&mut self, fault: Fault) -> Result<()> {
         match fault {
             Fault::Skip { at, size } => self.machine.skip((at, size))?,
             Fault::Flag { at, flag } => {
@@ -162,7 +173,7 @@ impl Rig {
                 self.machine.flip(register, bit);
             }
         }
-        Ok(self.final_outcome(has_good))
+        Ok(())
     }
 
     /// Outcome with an extra start if the bootloader stays and the fault has changed retained RAM: a forged proof must not start an image.
