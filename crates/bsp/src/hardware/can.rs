@@ -11,6 +11,7 @@ use stm32f4xx_hal::pac::{CAN1, RCC, can1};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 use super::gpio::{enable, output_of, port};
+use super::self_test;
 use super::time_base::Clock;
 use super::transmit::Transmitter;
 use crate::bit_rate_detection::Heard;
@@ -56,7 +57,9 @@ impl Controller {
         CAN1::enable(rcc);
         CAN1::reset(rcc);
         let can = bxcan::Can::builder(Registers).leave_disabled();
-        (Controller { can, losses }, Transmitter::new())
+        let mut controller = Controller { can, losses };
+        self_test::note_loop_back(&mut controller);
+        (controller, Transmitter::new())
     }
 
     /// Goes on the bus, or restarts on the bus: drops the content of the mailboxes and takes new timing and filters.
@@ -193,7 +196,7 @@ fn make_pins(rcc: &RCC) {
 }
 
 /// Requests initialisation, and waits until the controller acknowledges it and has left sleep.
-fn is_initialising() -> bool {
+pub(super) fn is_initialising() -> bool {
     registers().mcr().modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
     let latest = Clock::now() + LONGEST_FRAME;
     loop {
