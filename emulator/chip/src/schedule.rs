@@ -167,7 +167,7 @@ impl Stm32f4 {
     pub(crate) fn run_spi(&mut self, index: usize, now: Time) {
         let (wired, open) = (self.ssi_is_wired(index), Far::Nothing(self.open_input(index)));
         let plant = &self.plant;
-        self.spis[index].run(now, |at| plant.absolute(at).filter(|_| wired).map_or(open, Far::Position));
+        self.spis[index].run(now, |at| plant.absolute(at).filter(|_| wired).map_or(open, Far::Encoder));
         let place = &SPIS[index];
         if index == SPI2 && self.spis[index].asks_to_store() && self.losses.take(Loss::SpiByte) {
             self.spis[index].lose();

@@ -23,7 +23,7 @@ use crate::plant::Plant;
 use crate::pwr::Pwr;
 use crate::rcc::{Cause, Rcc};
 use crate::rules::Rules;
-use crate::spi::{Spi, Ssi};
+use crate::spi::{Spi, Ssi, SsiFormat};
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 use crate::unmodelled::{Record, Unmodelled};
@@ -137,6 +137,18 @@ impl Stm32f4 {
             Loss::Abort => self.can.can1.transmitter.late_aborts += times,
             _ => self.losses.add(loss, times),
         }
+    }
+
+    /// The format of the absolute encoder's word.
+    pub fn ssi(&self) -> SsiFormat {
+        self.board.ssi
+    }
+
+    /// Connects an absolute encoder with another format at `now`.
+    pub fn set_ssi(&mut self, format: SsiFormat, now: Time) {
+        self.catch_up(now);
+        self.board.ssi = format;
+        self.spis.iter_mut().for_each(|spi| spi.set_format(format));
     }
 
     /// Sets the frequency of the LSI in hertz. The watchdog has it from the next reset on.

@@ -175,7 +175,7 @@ impl Board {
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
         // The board may have run a few instructions further, and the chip's time cannot go back.
         let now = now.max(self.machine.now());
-        stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
+        stimulus.act_on(self.machine.peripherals_mut(), now);
     }
 
     /// The current stimuli of the sensors.
@@ -191,6 +191,7 @@ impl Board {
             thermistor: knob(plant.thermistor_signal(), plant.thermistor(now)),
             supply: knob(plant.supply_signal(), plant.supply(now)),
             shaft: knob(plant.motion(), plant.revolutions(now)),
+            ssi: self.machine.peripherals().ssi().to_string(),
             buttons: plant.held(),
             faults: plant.faults(now).map(FaultKind::name).collect(),
         }
