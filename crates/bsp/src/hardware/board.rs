@@ -72,7 +72,8 @@ impl Board {
         let gpioa = device.GPIOA.split(&mut rcc);
         let gpiob = device.GPIOB.split(&mut rcc);
         let gpioc = device.GPIOC.split(&mut rcc);
-        let (can, transmitter) = Controller::new(device.CAN1, losses, &mut rcc);
+        let (mut can, transmitter) = Controller::new(device.CAN1, losses, &mut rcc);
+        self_test::note_loop_back(&mut can);
         let analogue = sampling::Parts {
             adc: device.ADC1,
             common: device.ADC_COMMON,
