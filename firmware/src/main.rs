@@ -156,7 +156,7 @@ mod app {
                 service_frames,
                 lost,
                 services_alarm,
-                board.led,
+                (board.led, board.indicators),
                 start_up_faults,
             ),
             storage,

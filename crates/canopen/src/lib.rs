@@ -21,6 +21,7 @@ pub mod emcy;
 mod frame;
 pub mod guide;
 mod heartbeat;
+pub mod indicators;
 pub mod lss;
 pub mod nmt;
 mod node_id;

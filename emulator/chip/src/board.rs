@@ -1,7 +1,7 @@
 //! The properties of the board around the chip.
 
 pub use crate::plant::FrontEnd;
-pub use crate::spi::SsiFormat;
+pub use crate::spi::{SsiFormat, SsiFormatError};
 
 /// Number of buttons on the board.
 pub const BUTTONS: usize = 2;

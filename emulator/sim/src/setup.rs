@@ -45,8 +45,9 @@ pub fn world(options: &Options) -> Result<World> {
     }
     ensure!(all_are_for_a_node(&options.oscillator, options), "an oscillator is for nobody");
     ensure!(all_are_for_a_node(&options.lsi, options), "an LSI is for nobody");
-    let Options { pressure, temperature, thermistor, supply, shaft, button, fault, .. } = options;
-    let stimuli = [pressure, temperature, thermistor, supply, shaft, button, fault].into_iter().flatten();
+    let Options { pressure, temperature, thermistor, supply, shaft, ssi, button, fault, .. } = options;
+    let stimuli =
+        [pressure, temperature, thermistor, supply, shaft, ssi, button, fault].into_iter().flatten();
     for stimulus in stimuli {
         world.apply(stimulus).context("a stimulus is for nobody")?;
     }

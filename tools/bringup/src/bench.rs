@@ -171,6 +171,20 @@ impl Bench<'_> {
         self.object(SELF_TEST, 0)
     }
 
+    /// A value of the board in 2005h that only development images have; otherwise `None`, with a remark.
+    ///
+    /// # Errors
+    /// The node does not answer.
+    pub fn start_test(&mut self, what: &str, number: u8) -> Result<Option<u32>> {
+        let value = self.self_test(number)?;
+        // The clock of a development image takes some time to start.
+        let is_tested = self.self_test(values::CLOCK_WAIT)? != 0;
+        if !is_tested {
+            self.remark(what, "not tested", "a value", "Flash development images for this check");
+        }
+        Ok(is_tested.then_some(value))
+    }
+
     fn client(&mut self) -> sdo::Client<'_> {
         let node = self.node;
         sdo::Client::new(self.desk.network(), node, sdo::Options::default())

@@ -14,6 +14,7 @@ mod definition;
 mod emergencies;
 mod events;
 mod faults;
+mod indicators;
 mod inner;
 mod lss;
 mod more_sdo;

@@ -54,6 +54,11 @@ impl<D: Definition> Services<D> {
         }
     }
 
+    /// Whether an LSS master configures the device.
+    pub(super) fn is_in_lss(&self) -> bool {
+        D::Application::LSS && self.lss.is_selected()
+    }
+
     pub(super) fn set_node_id(&mut self, node_id: Option<NodeId>) {
         self.lss.set_node_id(node_id);
     }

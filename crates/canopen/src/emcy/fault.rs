@@ -208,6 +208,16 @@ impl FaultSet {
         *self != before
     }
 
+    /// Whether a fault is active that can be active only once; never for others.
+    pub(crate) fn has(self, fault: Fault) -> bool {
+        fault.bit().is_some_and(|bit| self.single & 1 << bit != 0)
+    }
+
+    /// Whether stored values could not be loaded.
+    pub(crate) fn has_stored_data(self) -> bool {
+        self.single & !Fault::OF_COMMUNICATION != 0
+    }
+
     pub(crate) fn is_empty(self) -> bool {
         self == FaultSet::EMPTY
     }

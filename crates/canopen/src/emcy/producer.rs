@@ -199,6 +199,16 @@ impl Producer {
         self.active.register(self.conditions) & self.register_bits
     }
 
+    /// Whether a fault is active that can be active only once.
+    pub(crate) fn has(&self, fault: Fault) -> bool {
+        self.active.has(fault)
+    }
+
+    /// Whether stored values could not be loaded.
+    pub(crate) fn has_stored_data(&self) -> bool {
+        self.active.has_stored_data()
+    }
+
     pub(crate) fn history(&self) -> &History {
         &self.history
     }

@@ -215,6 +215,11 @@ impl Rpdo {
         self.faults != 0
     }
 
+    /// Whether it has not arrived in time.
+    pub(crate) fn is_missing(&self) -> bool {
+        self.faults & 1 << RpdoFault::Deadline as u8 != 0
+    }
+
     /// When the next frame is missing.
     pub(crate) fn due(&self) -> Tick {
         self.due

@@ -72,6 +72,13 @@ impl EmulatedDesk {
         act(&mut self.world.borrow_mut())
     }
 
+    /// Resets the board, and lets it start.
+    pub(crate) fn restart(&mut self) {
+        // Nothing of the core can be missing.
+        let _ = self.write(AIRCR.0, AIRCR.1);
+        self.run(Duration::from_millis(2000));
+    }
+
     fn run(&self, span: Duration) {
         let mut world = self.world.borrow_mut();
         let end = world.now() + Time::from_micros(span.0);

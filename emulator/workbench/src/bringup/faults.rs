@@ -1,5 +1,6 @@
 //! Faults of hardware, each with the step that must be red and the words that it must say.
 
+use canbus::Time;
 use chip::Loss;
 use programmer::protect::OptionBytes;
 use sim::world::World;
@@ -14,6 +15,8 @@ pub enum Kind {
     Flags(&'static str),
     /// A change of the running board.
     Board(fn(&mut World)),
+    /// A change of the board, which is reset afterwards.
+    Start(fn(&mut World)),
     /// A mistake at the desk.
     Desk(Mistake),
 }
@@ -35,7 +38,7 @@ const fn fault(name: &'static str, step: &'static str, says: &'static str, kind:
 }
 
 /// All faults.
-pub const ALL: [Fault; 24] = [
+pub const ALL: [Fault; 28] = [
     fault("the debug probe is not connected", "supply", "no debug probes", Kind::Desk(Mistake::NoProbe)),
     fault("VDDA is 2.95 V", "supply", "VDDA", Kind::Board(|world| rails(world, 2.95))),
     fault("VDDA is 3.7 V", "supply", "VDDA", Kind::Board(|world| rails(world, 3.7))),
@@ -65,6 +68,14 @@ pub const ALL: [Fault; 24] = [
         "clock",
         "clock against that of the adapter",
         Kind::Flags("--oscillator -300"),
+    ),
+    fault("the crystal starts slowly", "clock", "start of the clock", Kind::Start(slow_crystal)),
+    fault("the LSI has 60 kHz", "watchdog", "LSI by TIM5", Kind::Start(fast_lsi)),
+    fault(
+        "the CAN controller does not receive its own frames",
+        "loop-back",
+        "not received",
+        Kind::Start(|world| world.machine(0).peripherals_mut().lose(Loss::LoopBack, 1)),
     ),
     fault("the receive pin is held low", "receive", "PB8", Kind::Board(hold_receive)),
     fault("one frame in ten has a wrong bit", "bus", "frames at", Kind::Board(|world| noise(world, 0.1))),
@@ -104,6 +115,7 @@ pub const ALL: [Fault; 24] = [
     ),
     fault("A and B are swapped", "encoder", "steps in a revolution", Kind::Desk(Mistake::Backwards)),
     fault("the supply is 2.8 V", "saves", "the step", Kind::Flags("--supply const:2.8")),
+    fault("the stack is nearly used up", "saves", "unused stack", Kind::Board(deep_stack)),
     fault("the flash does not come to an end", "saves", "the step", Kind::Board(hang)),
 ];
 
@@ -119,9 +131,29 @@ impl Fault {
         match self.kind {
             Kind::Flags(_) => {}
             Kind::Board(act) => desk.with(act),
+            Kind::Start(act) => {
+                desk.with(act);
+                desk.restart();
+            }
             Kind::Desk(mistake) => desk.mistake = Some(mistake),
         }
     }
+}
+
+/// 50 ms, also for the bootloader, which waits up to a second.
+fn slow_crystal(world: &mut World) {
+    world.machine(0).peripherals_mut().set_hse_start(Time::from_millis(50));
+}
+
+fn fast_lsi(world: &mut World) {
+    world.machine(0).peripherals_mut().set_lsi(60_000);
+}
+
+/// The marks of the lowest kilobytes are gone.
+fn deep_stack(world: &mut World) {
+    const LOW: u32 = 0x2000_0400;
+    // A write to RAM does not fail.
+    let _ = world.machine(0).write(LOW, &[0; 4]);
 }
 
 fn rails(world: &mut World, vdda: f64) {
@@ -163,5 +195,5 @@ fn lose(world: &mut World, loss: Loss) {
 }
 
 fn hang(world: &mut World) {
-    world.machine(0).peripherals_mut().flash_mut().hang(canbus::Time::NEVER);
+    world.machine(0).peripherals_mut().flash_mut().hang(Time::NEVER);
 }

@@ -88,6 +88,8 @@ pub struct BxCan {
     release: u32,
     /// The controller acknowledges no other mode until a reset.
     is_held: bool,
+    /// Frames in loop-back that a test makes the controller lose, also after resets.
+    lost_loops: usize,
     poke: bool,
 }
 
@@ -121,6 +123,7 @@ impl BxCan {
             reception: Reception::default(),
             release: RELEASE,
             is_held: false,
+            lost_loops: 0,
             poke: false,
         }
     }
@@ -129,13 +132,19 @@ impl BxCan {
     pub(super) fn reset(&mut self) {
         let mut monitor = self.monitor;
         monitor.cancel();
-        let (reception, release) = (self.reception, self.release);
-        *self = BxCan { monitor, reception, release, poke: true, ..BxCan::new(self.slave, self.clock) };
+        let (reception, release, lost_loops) = (self.reception, self.release, self.lost_loops);
+        let fresh = BxCan::new(self.slave, self.clock);
+        *self = BxCan { monitor, reception, release, lost_loops, poke: true, ..fresh };
     }
 
     /// Holds the controller in its mode until a reset.
     pub(crate) fn hold(&mut self) {
         self.is_held = true;
+    }
+
+    /// Loses the next frames in loop-back.
+    pub(crate) fn lose_loops(&mut self, times: usize) {
+        self.lost_loops += times;
     }
 
     /// CAN_BTR.

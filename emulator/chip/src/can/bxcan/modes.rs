@@ -71,6 +71,11 @@ impl BxCan {
             (true, _) => self.stop(Mode::Initialisation),
             (false, true) => self.stop(Mode::Sleep),
             (false, false) if self.mode == Mode::Normal => self.recover(now),
+            // The feedback is internal: nothing on the bus delays it.
+            (false, false) if self.loops_back() => {
+                self.monitor.cancel();
+                self.synchronised(now);
+            }
             (false, false) if !self.monitor.is_waiting() => self.monitor.wait(1, now),
             (false, false) => {}
         }

@@ -1,6 +1,6 @@
 // The controls of one board: the inputs of its sensors, its buttons, its faults.
 
-import { button, el } from "../dom.js";
+import { button, el, field } from "../dom.js";
 import { outcome } from "../outcome.js";
 import { toggle } from "../parts/switch.js";
 import { Quantity } from "./quantity.js";
@@ -15,6 +15,9 @@ const QUANTITIES = [
   { kind: "shaft", name: "Shaft", unit: "revolutions", low: -10, high: 10, step: 0.01, start: 0, factor: 1, rpm: true },
 ];
 
+/** The power of the board: what a button says, and what the simulator takes. */
+const POWER = [["Power off", "off"], ["Power on", "on"], ["Cut for 0.5 s", "off:0.5"]];
+
 export class Board {
   constructor(bus, board, faults) {
     Object.assign(this, { bus, id: board.board, buttons: [] });
@@ -22,8 +25,12 @@ export class Board {
     this.quantities = QUANTITIES.map((quantity) => new Quantity(quantity, (kind, spec) => this.#send(kind, spec)));
     this.switches = new Map(faults.map((fault) => [fault.name, this.#fault(fault)]));
     this.buttons = board.buttons.map((_, at) => this.#button(at + 1));
+    this.format = el("input", { type: "text", size: 24, title: "Turns + steps in bits, then gray or binary, error, even or odd" });
+    const power = POWER.map(([name, spec]) => button(name, () => this.#send("power", spec)));
     const title = `Board ${board.board}${board.node == null ? "" : `: node ${board.node}, ${board.personality ?? "-"}`}`;
     this.element = el("fieldset", { class: "box board", data: { board: board.board } }, el("legend", {}, title), this.quantities.map(({ element }) => element),
+      el("div", { class: "group", role: "group", "aria-label": "Power" }, power),
+      el("div", { class: "bar" }, field("Absolute encoder", this.format), button("Connect", () => this.#send("ssi", this.format.value))),
       el("fieldset", {}, el("legend", {}, "Faults"), el("div", { class: "switches" }, [...this.switches.values()].map(({ element }) => element))),
       el("div", { class: "group", role: "group", "aria-label": "Buttons" }, this.buttons), this.result.line);
     this.show(board);
@@ -31,6 +38,7 @@ export class Board {
 
   show(board) {
     for (const quantity of this.quantities) if (board[quantity.kind]) quantity.show(board[quantity.kind]);
+    if (document.activeElement !== this.format) this.format.value = board.ssi ?? "";
     for (const [name, { box }] of this.switches) box.checked = board.faults.includes(name);
   }
 
