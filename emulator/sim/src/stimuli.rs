@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use canbus::Time;
-use chip::plant::{Fault, FaultSwitch, Motion, Plant, Push, Signal};
+use chip::plant::{Fault, FaultSwitch, Motion, Push, Signal};
 use chip::{BUTTONS, SsiFormat, Stm32f4};
 use serde::Serialize;
 
