@@ -184,7 +184,7 @@ impl Dictionary {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
         let before = if number == 0 { 0 } else { number.wrapping_mul(self.stride(series)) };
         let offset = series.offset.wrapping_add(before).wrapping_add(place.offset);
-        let field = Field { offset, size: attributes.kind.size() };
+        let field = Field { offset, size: attributes.size };
         Some(Entry { attributes, field, sub: place.sub, index: series.index.wrapping_add(number) })
     }
 
@@ -195,7 +195,7 @@ impl Dictionary {
         let Some((_, [attributes, ..])) = self.attributes.split_at_checked(last.attributes as usize) else {
             return 0;
         };
-        last.offset.wrapping_add(attributes.kind.size() as u16)
+        last.offset.wrapping_add(attributes.size as u16)
     }
 
     /// The location of a value, for use at compile time.
@@ -223,7 +223,7 @@ impl Dictionary {
             fail(index, sub, "no such sub-index in the dictionary");
         }
         let Place { offset, attributes, .. } = self.places[place];
-        let size = self.attributes[attributes as usize].kind.size();
+        let size = self.attributes[attributes as usize].size;
         let object = series.offset + (index - series.index) * self.stride(series);
         Field { offset: object.wrapping_add(offset), size }
     }
