@@ -23,6 +23,7 @@ mod services;
 mod tables;
 mod transmission;
 mod types;
+mod variable;
 
 #[doc(hidden)]
 pub use builder::TableBuilder;
@@ -44,3 +45,4 @@ pub use tables::{Dictionary, Entries, Tables};
 #[doc(hidden)]
 pub use transmission::Transmission;
 pub use types::Type;
+pub use variable::{Number, Variable};

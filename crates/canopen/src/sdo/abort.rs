@@ -107,12 +107,13 @@ impl Abort {
 
     /// The code on the wire.
     #[must_use]
+    #[allow(clippy::indexing_slicing, reason = "the table has all reasons")]
     pub const fn code(self) -> u32 {
-        let digits = self.digits() as u32;
+        let digits = DIGITS[self as usize] as u32;
         (digits & 0xF000) << 12 | (digits & 0x0F00) << 8 | digits & 0xFF
     }
 
-    /// The code without the zeros that all codes have: 6A23h for 060A 0023h. Half of the constants.
+    /// The code without the zeros that all codes have: 6A23h for 060A 0023h.
     const fn digits(self) -> u16 {
         match self {
             Abort::Toggle => 0x5300,
@@ -187,6 +188,17 @@ impl Abort {
         }
     }
 }
+
+/// The digits of all codes, which take half of the flash that the codes would take.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+const DIGITS: [u16; Abort::ALL.len()] = {
+    let (mut digits, mut i) = ([0; Abort::ALL.len()], 0);
+    while i < digits.len() {
+        digits[Abort::ALL[i] as usize] = Abort::ALL[i].digits();
+        i += 1;
+    }
+    digits
+};
 
 /// The meaning and the code.
 impl core::fmt::Display for Abort {
