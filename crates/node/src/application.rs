@@ -114,6 +114,7 @@ impl NodeApplication {
 
 impl Application for NodeApplication {
     const CONDITIONS: &'static [Condition] = &CONDITIONS;
+    const SENDS_EVENTS: bool = true;
 
     fn register_bits(&self) -> u8 {
         self.profile.register_bits()

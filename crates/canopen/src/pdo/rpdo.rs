@@ -123,7 +123,9 @@ impl Rpdo {
     /// Takes new settings and discards the state of the old ones.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
         self.is_valid = settings.is_some();
-        self.settings = settings.unwrap_or(RpdoSettings::UNUSED);
+        if let Some(settings) = settings {
+            self.settings = settings;
+        }
         self.stop();
     }
 

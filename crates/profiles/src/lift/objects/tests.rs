@@ -599,7 +599,7 @@ fn the_pdos_are_those_of_the_catalogue() {
 /// A shared identifier would put two PDOs into one frame.
 #[test]
 fn no_two_pdos_share_an_identifier() {
-    let mut ids: Vec<i64> = rows().filter(|row| row.rule == Rule::PdoPredefined).map(cob_id).collect();
+    let mut ids: Vec<i64> = rows().filter(|row| row.rule() == Rule::PdoPredefined).map(cob_id).collect();
     assert_eq!(ids.len(), 15);
     ids.sort_unstable();
     ids.dedup();
