@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use start::{Package, is_installed};
 
 use crate::command::{cargo, root, run};
-use crate::setup::system;
+use crate::apt;
 use crate::tools;
 
 /// The measured crates, and below them the crates whose tests run as well.
@@ -34,7 +34,7 @@ pub(crate) fn print() -> Result<()> {
     command.args(["--ignore-filename-regex", IGNORED]).env("PATH", tools::with("cargo-llvm-cov")?);
     if start::target::is_closed() {
         if !is_installed(Package::DebianLlvm) {
-            system::install(&[Package::DebianLlvm])?;
+            apt::install(&[Package::DebianLlvm])?;
         }
         let tool = |name: &str| Path::new(DEBIAN_LLVM).join(name);
         command.env("LLVM_COV", tool("llvm-cov")).env("LLVM_PROFDATA", tool("llvm-profdata"));
