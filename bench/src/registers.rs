@@ -1,4 +1,4 @@
-//! The registers between the program and the host. `emulator/bench` has the other side, at the same addresses.
+//! The registers between the program and the host. `emulator/workbench` has the other side, at the same addresses.
 
 use core::ptr;
 use core::sync::atomic::{Ordering, compiler_fence};

@@ -26,7 +26,8 @@ const AUTHORISATION: &[Object] = if AUTHORISATION_KEY.is_some() {
 /// The board, which the header of an image names.
 const BOARD: &[Object] = &[
     Object::highest(0x2004, 1, "Program state"),
-    Object::new(0x2004, 1, "Board", Type::Unsigned32, Access::ReadOnly).value(product::BOARD as i64),
+    Object::new(0x2004, 1, "Board", Type::Unsigned32, Access::ReadOnly)
+        .value(profiles::product::BOARD as i64),
 ];
 
 /// 1F51h, whose commands the bootloader decides on.

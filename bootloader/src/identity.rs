@@ -37,7 +37,7 @@ impl Identity {
             timing = Some(note.timing);
         }
         let serial_number = factory::serial_number();
-        Identity { node_id, timing, product: product::code(personality), serial_number }
+        Identity { node_id, timing, product: profiles::product::code(personality), serial_number }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The program on the bus: effects of a master's commands, and values of the objects of CiA 302-3.
 
-use bsp::ProgramFlash;
 use bsp::boards::BOARD;
+use bsp::{ProgramFlash, retained};
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};
@@ -89,9 +89,16 @@ impl Program {
             // The program is stopped and reset already.
             STOP | RESET => Ok(()),
             START => self.start(),
-            CLEAR => self.updater.clear().map_err(abort),
+            CLEAR => self.clear(),
             _ => Err(Abort::InvalidValue),
         }
+    }
+
+    fn clear(&mut self) -> Result<(), Abort> {
+        let mut clears = retained::clears();
+        let outcome = self.updater.clear_within(&mut clears);
+        retained::set_clears(clears);
+        outcome.map_err(abort)
     }
 
     fn answer(&mut self, response: &[u8]) -> Result<(), Abort> {
@@ -115,7 +122,8 @@ impl Application for Program {
 
     fn initialise(&mut self, image: &mut [u8]) {
         HARDWARE.set(image, BOARD.name.as_bytes());
-        let identity = [product::VENDOR_ID, self.product, product::REVISION, self.serial_number];
+        let identity =
+            [profiles::product::VENDOR_ID, self.product, profiles::product::REVISION, self.serial_number];
         for (field, value) in IDENTITY.into_iter().zip(identity) {
             field.store(image, value.to_le_bytes());
         }
@@ -147,7 +155,7 @@ impl Application for Program {
 /// The abort code of a refusal for the SDO client; 1F57h has the details.
 fn abort(refusal: Refusal) -> Abort {
     match refusal {
-        Refusal::NotCleared | Refusal::OnTrial | Refusal::Unspecified => Abort::DeviceState,
+        Refusal::NotCleared | Refusal::OnTrial | Refusal::Worn | Refusal::Unspecified => Abort::DeviceState,
         _ => Abort::Hardware,
     }
 }

@@ -1,13 +1,11 @@
 //! The bootloader on the bus: the CANopen device, the update, and the actions between them.
 
-use core::iter::{empty, once};
-
 use bsp::back_off::BackOff;
 use bsp::bit_rate_detection::{Heard, Step};
 use bsp::bit_timing::BitTiming;
 use bsp::bus_state::BusState;
 use bsp::can::Controller;
-use bsp::filters::{self, Banks};
+use bsp::filters::{Bank, Fifo, Pair};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
@@ -25,6 +23,9 @@ use crate::target::TARGET;
 const PERIOD: Duration = Duration::from_millis(20);
 /// Polling interval while a sector is being erased.
 const ERASE_POLL: Duration = Duration::from_millis(1);
+/// CAN-IDs (CiA 301, 7.3.5): a request to the SDO server of node 0, and a message of the LSS master.
+const SDO_REQUEST: u16 = 0x600;
+const LSS_REQUEST: u16 = 0x7E5;
 /// Longest time for which a reset waits for unsent frames: at 10 kbit/s a frame of another node, and two of this one.
 const FAREWELL: Duration = Duration::from_millis(50);
 
@@ -121,9 +122,10 @@ impl Session {
         let next_call = self.device.poll(now, out);
         let due = self.fulfil(next_call, out);
         match (self.reset, next) {
-            (Some(latest), _) => Then::Reset(latest),
-            (None, Next::Step) => Then::Again,
-            (None, Next::Erasing) => Then::Sleep(due.min(after(ERASE_POLL))),
+            // A reset waits until the work on the flash is done: resets in the middle of copies would wear it out.
+            (_, Next::Step) => Then::Again,
+            (_, Next::Erasing) => Then::Sleep(due.min(after(ERASE_POLL))),
+            (Some(latest), Next::Nothing) => Then::Reset(latest),
             (None, Next::Nothing) => Then::Sleep(due.min(after(PERIOD)).min(self.back_off.due())),
         }
     }
@@ -212,9 +214,11 @@ impl Session {
         self.can.set_filters(&self.banks());
     }
 
-    /// Filters for NMT, SDO and LSS, all to FIFO 1: there are no other frames, and a client waits for its answers.
-    fn banks(&self) -> Banks {
-        let ids = once(CanId::NMT).chain(self.device.service_ids());
-        filters::pack(empty(), ids.map(CanId::get))
+    /// Filters for NMT, LSS and SDO, all to FIFO 1: there are no other frames, and a client waits for its answers. Not those
+    /// of [`ServiceDevice::service_ids`], whose iterator needs 800 bytes of flash.
+    fn banks(&self) -> [Bank; 2] {
+        let request = self.device.node_id().map_or(LSS_REQUEST, |own| SDO_REQUEST | u16::from(own.get()));
+        [[CanId::NMT.get(), LSS_REQUEST], [request; 2]]
+            .map(|pair| Bank { fifo: Fifo::Services, pairs: pair.map(Pair::exactly) })
     }
 }

@@ -8,7 +8,7 @@ use update::key::{HAS_PUBLISHED_KEY, PUBLIC_KEYS};
 const HARDWARE: u8 = 0;
 
 pub(crate) const TARGET: Target =
-    Target { layout: LAYOUT, board: product::BOARD, hardware: HARDWARE, keys: &PUBLIC_KEYS };
+    Target { layout: LAYOUT, board: profiles::product::BOARD, hardware: HARDWARE, keys: &PUBLIC_KEYS };
 
 const _: () = assert!(
     cfg!(any(feature = "development", feature = "published-keys")) || !HAS_PUBLISHED_KEY,

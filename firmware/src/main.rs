@@ -156,7 +156,7 @@ mod app {
                 service_frames,
                 lost,
                 services_alarm,
-                board.led,
+                (board.led, board.indicators),
                 start_up_faults,
             ),
             storage,
@@ -252,6 +252,7 @@ mod app {
         let mut node = (cx.shared.protocol, cx.shared.transmit);
         let retained = cx.shared.retained.lock(|retained| *retained);
         cx.local.storage.judge(&mut node);
+        cx.local.storage.refill_clears();
         cx.local.storage.report_programs(&mut node);
         cx.local.storage.watch_positions(&retained);
         cx.local.storage.run(&mut node, cx.shared.watchdog);

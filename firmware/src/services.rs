@@ -6,10 +6,11 @@ use bsp::bus_state::{BusState, BusWatch};
 use bsp::can::Controller;
 use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
-use bsp::led::Led;
+use bsp::led::{Indicators, Led};
 use bsp::losses::{EVENTS, Event, Losses};
 use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
+use canopen::indicators::BusHealth;
 use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
 use node::{Action, BitRate, BusEvent, Fault, Next, NodeId, Parameters, Protocol, State};
@@ -36,6 +37,7 @@ pub(crate) struct Services {
     told: [u32; EVENTS],
     alarm: Alarm,
     led: Led,
+    indicators: Indicators,
     watch: BusWatch,
     back_off: BackOff,
     /// Whether the node has been on the bus since its start.
@@ -73,7 +75,7 @@ impl Services {
         frames: Frames,
         lost: &'static Losses,
         alarm: Alarm,
-        led: Led,
+        (led, indicators): (Led, Indicators),
         start_up_faults: StartUpFaults,
     ) -> Services {
         Services {
@@ -84,6 +86,7 @@ impl Services {
             told: [0; EVENTS],
             alarm,
             led,
+            indicators,
             watch: BusWatch::default(),
             back_off: BackOff::default(),
             has_joined: false,
@@ -117,9 +120,22 @@ impl Services {
             retained::set_crashes(crashes.confirmed());
         }
         self.led.set(blink(now));
+        self.indicate(now, node);
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
         // The storage task must report to the watchdog, whether there is something to store or not.
         rtic::pend(STORAGE);
+    }
+
+    /// Shows the state of the node at its indicators.
+    fn indicate(&mut self, now: Instant, node: &mut impl Shared) {
+        let bus = match self.can.state() {
+            _ if self.rate.is_searched() => BusHealth::Searching,
+            BusState::Active => BusHealth::Good,
+            BusState::Warning | BusState::Passive => BusHealth::Warning,
+            BusState::Off => BusHealth::Off,
+        };
+        let shown = node.call(|protocol, _| protocol.indicators(bus));
+        self.indicators.set(shown.levels(now));
     }
 
     /// Whether the node is on the bus and measures.

@@ -6,9 +6,11 @@ use bsp::update_layout::LAYOUT;
 use bsp::{Clock, ParameterFlash, Watchdog, retained};
 use canopen::sdo::Abort;
 use canopen::{Duration, Instant};
-use node::{MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict};
+use node::{
+    MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict, log_event, stored_log,
+};
 use profiles::board::RETAINED_WORDS;
-use update::{Programs, Trial};
+use update::{Clears, Event, Programs, Trial};
 
 use crate::SERVICES;
 use crate::shared::Shared;
@@ -27,8 +29,10 @@ pub(crate) struct StorageTask {
     /// The retained positions, and the time of their last change.
     positions: Option<[u32; POSITIONS]>,
     moved: Instant,
-    /// The programs in the flash are reported to the node (2004h).
+    /// The programs in the flash and the log of updates are reported to the node (2004h, 2006h).
     has_reported_programs: bool,
+    /// The intervals for which the budget of clears was refilled.
+    intervals: u8,
 }
 
 /// The words retained by the last sample; `None` if the profile retains nothing.
@@ -50,6 +54,7 @@ impl StorageTask {
             positions: None,
             moved: Instant(0),
             has_reported_programs: false,
+            intervals: 0,
         }
     }
 
@@ -81,13 +86,37 @@ impl StorageTask {
         }
     }
 
-    /// Reports the programs in the flash, once. To look at them takes milliseconds, which the start does not wait for.
+    /// Refills the budget of clears.
+    pub(crate) fn refill_clears(&mut self) {
+        let intervals = Clears::intervals(Clock::now().0);
+        if intervals != self.intervals {
+            retained::set_clears(retained::clears().refill(intervals.wrapping_sub(self.intervals)));
+            self.intervals = intervals;
+            self.has_reported_programs = false;
+        }
+    }
+
+    /// Reports the programs in the flash and the log of updates, once. To look at them takes milliseconds, which the start
+    /// does not wait for.
     #[inline(never)]
     pub(crate) fn report_programs(&mut self, node: &mut impl Shared) {
         let Some(memory) = self.memory.as_mut().filter(|_| !self.has_reported_programs) else { return };
         self.has_reported_programs = true;
-        let programs = Programs::read(&mut memory.store().flash().trial(), &LAYOUT);
-        node.call(|protocol, _| protocol.set_programs(programs));
+        let store = memory.store();
+        let programs = Programs::read(&mut store.flash().trial(), &LAYOUT, retained::clears());
+        let event = Event::pending(&mut store.flash().trial(), &LAYOUT);
+        if let Some(event) = event {
+            match log_event(&event, store) {
+                Ok(()) => event.settle(&mut store.flash().trial(), &LAYOUT),
+                Err(_) => defmt::error!("an event of the update is not stored"),
+            }
+        }
+        let log = stored_log(store);
+        node.call(|protocol, _| {
+            protocol.set_programs(programs);
+            protocol.set_update_log(log);
+        });
+        self.report(node);
     }
 
     /// Carries out the verdict on the trial of this program.
@@ -96,18 +125,24 @@ impl StorageTask {
         let Some(memory) = &mut self.memory else { return };
         let mut records = memory.store().flash().trial();
         let is_done = match verdict {
-            Verdict::Confirm => Trial::confirm(&mut records, &LAYOUT).is_ok(),
-            Verdict::TakeBack => Trial::withdraw(&mut records, &LAYOUT).is_ok(),
+            Verdict::Confirm(cause) => {
+                cause.note(&mut records, &LAYOUT);
+                Trial::confirm(&mut records, &LAYOUT).is_ok()
+            }
+            Verdict::TakeBack(cause) => {
+                cause.note(&mut records, &LAYOUT);
+                Trial::withdraw(&mut records, &LAYOUT).is_ok()
+            }
         };
         match verdict {
             // The next run tries again.
             _ if !is_done => defmt::error!("the trial of this program cannot be ended"),
-            Verdict::Confirm => {
+            Verdict::Confirm(_) => {
                 defmt::info!("this program is confirmed");
                 self.has_reported_programs = false;
                 node.call(|protocol, _| protocol.end_trial());
             }
-            Verdict::TakeBack => {
+            Verdict::TakeBack(_) => {
                 defmt::warn!("the program before this one comes back");
                 cortex_m::peripheral::SCB::sys_reset()
             }

@@ -8,7 +8,7 @@ ROOT = Path(__file__).parents[2]
 STATED = ROOT / "docs" / "pictures" / "sources.json"
 
 #: What draws the pictures: the page, and the screen of the simulator.
-SOURCES = {"page": ["tools/page/web"], "terminal": ["emulator/sim/src/display"]}
+SOURCES = {"page": ["tools/nodectl/web"], "terminal": ["emulator/sim/src/display"]}
 
 
 def hashes() -> dict[str, str]:

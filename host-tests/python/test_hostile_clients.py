@@ -1,7 +1,7 @@
 """Hostile programs and web pages on the machine of the simulator, beside a page with the token: its requests are answered,
 its update goes through, and none of the others changes anything.
 
-`-s` prints the median time of a request of the page, alone and beside the others.
+`-s` prints the median time of a request of the page, alone and beside the others. With `THOROUGH=1` the clients send ten times as much.
 """
 
 import base64
@@ -18,8 +18,9 @@ from full_bus import Client
 from simulator import Simulator
 from test_update import identification, image
 
+IS_THOROUGH = os.environ.get("THOROUGH") == "1"
 #: What the hostile clients do at least before the page stops measuring.
-FRAMES, ACTIONS = 100_000, 10_000
+FRAMES, ACTIONS = (100_000, 10_000) if IS_THOROUGH else (10_000, 1_000)
 #: Requests of the page with the token, for each median.
 READS = 100
 #: What a web page would like to send: NMT stop for all nodes.
@@ -117,7 +118,7 @@ class Attack:
 
 
 def latency(page: Client) -> float:
-    """The median time of a request that reads one object. It depends on the machine, and is printed only."""
+    """The median time of a request that reads one object."""
     times = []
     for _ in range(READS):
         start = time.monotonic()
@@ -133,18 +134,22 @@ def test_the_page_with_the_token_reads_and_updates_beside_hostile_clients(tmp_pa
     simulator = Simulator("--bitrate", "1000", "--control", "127.0.0.1:0", speed="real")
     page = Client(simulator.greeting["page"])
     page.ask("values", node=1)
-    alone = min(latency(page) for _ in range(3))
+    alone = [latency(page) for _ in range(3)]
     attack = Attack(simulator)
     beside = []
     while attack.frames.value < FRAMES or attack.actions.value < ACTIONS or len(beside) < 3:
         beside.append(latency(page))
-    print(f"{attack.frames.value} frames, {attack.actions.value} actions, {1000 * alone:.1f} ms alone, {1000 * median(beside):.1f} ms beside")
+    sent = f"{attack.frames.value} frames, {attack.actions.value} actions"
     data = base64.b64encode(b.read_bytes()).decode()
     file = page.ask("update.inspect", node=1, name="b.img", data=data)
     assert file["allowed"]
     outcome = page.ask("update.start", node=1, file=file["file"])
     assert (outcome["result"], outcome["new_identification"]) == ("updated", identification(b))
     attack.stop()
+    # The machine may have got slower or faster since: other tests run beside this one.
+    alone += [latency(page) for _ in range(3)]
+    print(f"{sent}, {1000 * max(alone):.1f} ms alone, {1000 * median(beside):.1f} ms beside, {1000 * min(beside):.1f} at best")
+    assert (median(beside) if IS_THOROUGH else min(beside)) <= 2 * max(alone)
     states = [event["state"] for event in page.events if event.get("event") == "state"]
     assert "stopped" not in states
     assert page.ask("read", node=1, objects=[[0x1F56, 1]])["values"][0]["value"] == identification(b)

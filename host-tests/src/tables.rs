@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use node::{Personality, Setup};
-use product::{REVISION, VENDOR_ID};
+use profiles::product::{REVISION, VENDOR_ID};
 
 use crate::bench::{ID, setup};
 use crate::lift417;

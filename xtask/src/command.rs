@@ -78,7 +78,7 @@ pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
         .with_context(|| format!("cannot start {}", command.get_program().display()))
 }
 
-fn line(command: &Command) -> String {
+pub(crate) fn line(command: &Command) -> String {
     let program = Path::new(command.get_program());
     let mut text = program.file_name().unwrap_or_default().to_string_lossy().into_owned();
     for arg in command.get_args() {

@@ -6,7 +6,7 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use probe::Board;
+use programmer::probe::Board;
 
 use start::output;
 
@@ -80,7 +80,7 @@ impl Flags {
 pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     flags.check()?;
     let mut tools = cargo();
-    tools.args(["build", "--profile", "sim", "-p", "flash", "-p", "sign"]);
+    tools.args(["build", "--profile", "sim", "-p", "programmer"]);
     progress::build("tools", &mut tools)?;
     let toolchain = Toolchain::ensure()?;
     if flags.development && flags.application.is_none() {

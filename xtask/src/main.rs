@@ -1,5 +1,6 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
+mod apt;
 mod bench;
 mod bringup;
 mod callgraph;
@@ -20,6 +21,7 @@ mod pictures;
 mod plots;
 mod progress;
 mod regressions;
+mod release;
 mod reproducible;
 mod sbom;
 mod setup;
@@ -124,6 +126,8 @@ enum Command {
     },
     /// Write the software bill of materials of each product (CycloneDX): packages, checksums, licences, compiler
     Sbom(sbom::Flags),
+    /// Check the sources and make the files of a release (docs/release.md)
+    Release(release::Flags),
     /// Build the images in two folders, and compare what is flashed
     Reproducible,
     /// Install what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
@@ -177,6 +181,7 @@ fn run(command: Command) -> Result<()> {
         Command::Panics => callgraph::panics(Tools::ByCargo),
         Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo),
         Command::Reproducible => reproducible::check(&Toolchain::ensure()?),
+        Command::Release(flags) => release::make(&flags),
         Command::Sbom(flags) => sbom::write(&flags),
         Command::Setup { dry_run } => setup::run(dry_run),
         Command::Test(flags) => test::run(&flags),
@@ -191,4 +196,28 @@ fn list() -> Result<()> {
         println!("cargo xtask {:<15} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The lines of a workflow of .github that call `cargo xtask`.
+    fn calls(workflow: &str) -> impl Iterator<Item = &str> {
+        workflow.lines().filter_map(|line| Some(&line[line.find("cargo xtask ")? + "cargo ".len()..]))
+    }
+
+    #[test]
+    fn each_command_of_the_workflows_exists() {
+        let mut count = 0;
+        for file in std::fs::read_dir(command::root().join(".github/workflows")).unwrap() {
+            let path = file.unwrap().path();
+            for call in calls(&std::fs::read_to_string(&path).unwrap()) {
+                let result = Cli::try_parse_from(call.split_whitespace());
+                assert!(result.is_ok(), "{}: {call}: {}", path.display(), result.err().unwrap());
+                count += 1;
+            }
+        }
+        assert!(count >= 10, "{count} commands");
+    }
 }

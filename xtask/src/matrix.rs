@@ -34,7 +34,7 @@ pub(crate) fn write() -> Result<()> {
     tests.args(["test", "--profile", "sim", "-p", "host-tests", "--features", "board", "--test", "matrix"]);
     run(with_images(tests.env(LOG, &log), true))?;
     let mut programs = emulator::cargo_with_emulator()?;
-    run(programs.args(["build", "--profile", "sim", "-p", "sim", "-p", "nodectl", "-p", "sign"]))?;
+    run(programs.args(["build", "--profile", "sim", "-p", "sim", "-p", "nodectl", "-p", "programmer"]))?;
     let mut clients = Command::new(python::clients()?);
     clients.args(["-m", "pytest", "-q", "host-tests/python/test_matrix.py"]).current_dir(root());
     clients.env("IO_MODULE_COMMAND", built("examples/io_module")).env(LOG, &log);

@@ -27,7 +27,7 @@ impl Tools {
             return Ok(tool);
         }
         let mut command = emulator::cargo_with_emulator()?;
-        command.args(["run", "--quiet", "--profile", "sim", "-p", name, "--"]);
+        command.args(["run", "--quiet", "--profile", "sim", "-p", package(name), "--bin", name, "--"]);
         Ok(command)
     }
 }
@@ -38,9 +38,18 @@ pub(crate) fn run(tool: &str, arguments: &[OsString]) -> Result<()> {
     let manifest = root().join("Cargo.toml");
     let mut command = command::cargo();
     command
-        .args(["run", "--quiet", "--profile", "sim", "-p", tool, "--manifest-path"])
+        .args(["run", "--quiet", "--profile", "sim", "-p", package(tool), "--bin", tool, "--manifest-path"])
         .arg(manifest)
         .arg("--")
         .args(arguments);
     command::run(command.current_dir(here))
+}
+
+/// The package that has the program.
+fn package(program: &str) -> &str {
+    match program {
+        "flash" | "protect" | "sign" => "programmer",
+        "bench" | "bringup-emulated" | "glitch" => "workbench",
+        same => same,
+    }
 }

@@ -15,7 +15,7 @@ pub(crate) fn take() -> Result<()> {
     setup::check(setup::PICTURES)?;
     setup::install(setup::PICTURES)?;
     let mut build = emulator::cargo_with_emulator()?;
-    build.args(["build", "--profile", "sim", "-p", "sim", "-p", "nodectl", "-p", "sign"]);
+    build.args(["build", "--profile", "sim", "-p", "sim", "-p", "nodectl", "-p", "programmer"]);
     progress::build("programs", &mut build)?;
     images::build(Tools::Built)?;
     let mut command = Command::new(python::clients()?);

@@ -6,5 +6,5 @@ use crate::command::{cargo, run};
 
 /// Writes the plots and the tables.
 pub(crate) fn write() -> Result<()> {
-    run(cargo().args(["run", "--quiet", "-p", "plots"]))
+    run(cargo().args(["run", "--quiet", "-p", "profiles", "--example", "plots"]))
 }

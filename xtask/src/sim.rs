@@ -15,7 +15,7 @@ use crate::{images, progress};
 /// Builds the simulator, the tool that signs images, and the program that serves the page.
 fn build() -> Result<()> {
     let mut command = emulator::cargo_with_emulator()?;
-    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign", "-p", "nodectl"]);
+    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "programmer", "-p", "nodectl"]);
     progress::build("emulator 2/2", &mut command)
 }
 

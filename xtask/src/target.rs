@@ -11,8 +11,8 @@ use start::target::{has_target, is_closed, linker, missing};
 
 pub(crate) use start::target::TRIPLE;
 
+use crate::apt;
 use crate::command::{cargo, root, run};
-use crate::setup::system;
 
 /// Makes the compiler note the stack use of each function, in a section that is not flashed; `cargo xtask stack` adds
 /// it up. A stable compiler accepts the flag only with `RUSTC_BOOTSTRAP`.
@@ -36,7 +36,7 @@ impl Toolchain {
             return Ok(Toolchain::Installed);
         }
         if is_closed() {
-            system::install(&missing())?;
+            apt::install(&missing())?;
             let linker = linker().with_context(|| {
                 format!("no linker for {TRIPLE}: neither rustup's rust-lld nor Debian's lld-22 is there")
             })?;

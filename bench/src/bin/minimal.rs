@@ -22,6 +22,7 @@ impl Application for Keeper {
     const BLOCK_UPLOAD: bool = false;
     const BLOCK_DOWNLOAD: bool = false;
     const LSS: bool = false;
+    const BUS_SHARE: bool = false;
 }
 
 const INPUT: Object = Object::new(0x6000, 0, "", Type::Integer32, Access::ReadOnly).mappable(Mapping::Tpdo);
@@ -29,7 +30,7 @@ const INPUT: Object = Object::new(0x6000, 0, "", Type::Integer32, Access::ReadOn
 const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(0), objects::error_register(), objects::heartbeat_producer(1000)],
     objects::identity(0x1A, 0x2B, 1),
-    objects::tpdo(1, &[INPUT]),
+    objects::without_remote(objects::tpdo(1, &[INPUT])),
     [INPUT],
 );
 

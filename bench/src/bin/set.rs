@@ -20,6 +20,7 @@ type Measured = canopen::device!(Keeper, ROWS);
 struct Keeper;
 
 impl Application for Keeper {
+    const BUS_SHARE: bool = false;
     const CONDITIONS: &'static [canopen::Condition] = &[canopen::Condition::new(0x1000)];
 }
 
@@ -36,7 +37,7 @@ const fn rpdo(number: u16) -> [Object; 13] {
 }
 
 const fn tpdo(number: u16) -> [Object; 15] {
-    objects::tpdo(number, &[input(2 * number), input(2 * number + 1)])
+    objects::without_remote(objects::tpdo(number, &[input(2 * number), input(2 * number + 1)]))
 }
 
 const ROWS: &[Object] = canopen::rows!(

@@ -146,7 +146,7 @@ fn interrupt([number, ..]: &Content) -> i16 {
 
 /// The CRC of all words except the last.
 fn check(words: &Sealed) -> u32 {
-    let mut digest = checksum::begin();
+    let mut digest = storage::checksum::begin();
     words.iter().take(WORDS - 1).for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
 }

@@ -6,7 +6,7 @@
 /// production line must store its own numbers.
 #[must_use]
 pub fn serial_number(unique_id: &[u8; 12]) -> u32 {
-    checksum::of(unique_id)
+    storage::checksum::of(unique_id)
 }
 
 #[cfg(test)]

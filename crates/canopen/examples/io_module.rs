@@ -19,7 +19,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use canopen::dictionary::{
-    Access, Dictionary, Entry, Field, Group, Groups, Mapping, Object, Type, packed_size,
+    Access, Dictionary, Entry, Group, Groups, Mapping, Object, Type, Variable, packed_size,
 };
 use canopen::eds::DeviceInfo;
 use canopen::nmt::State;
@@ -76,17 +76,17 @@ const ROWS: &[Object] = canopen::rows!(
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-/// The places of the values, found at compile time.
-const READ: Field = DICTIONARY.field(0x6000, 1);
-const POLARITY_IN: Field = DICTIONARY.field(0x6002, 1);
-const FILTER: Field = DICTIONARY.field(0x6003, 1);
-const WRITE: Field = DICTIONARY.field(0x6200, 1);
-const POLARITY_OUT: Field = DICTIONARY.field(0x6202, 1);
-const ERROR_MODE: Field = DICTIONARY.field(0x6206, 1);
-const ERROR_VALUE: Field = DICTIONARY.field(0x6207, 1);
-const MEASURED: Field = DICTIONARY.field(0x6401, 1);
-const INTERRUPT: Field = DICTIONARY.field(0x6423, 0);
-const DELTA: Field = DICTIONARY.field(0x6426, 1);
+/// The places of the values, found at compile time, with their types.
+const READ: Variable<u8> = DICTIONARY.variable(0x6000, 1);
+const POLARITY_IN: Variable<u8> = DICTIONARY.variable(0x6002, 1);
+const FILTER: Variable<u8> = DICTIONARY.variable(0x6003, 1);
+const WRITE: Variable<u8> = DICTIONARY.variable(0x6200, 1);
+const POLARITY_OUT: Variable<u8> = DICTIONARY.variable(0x6202, 1);
+const ERROR_MODE: Variable<u8> = DICTIONARY.variable(0x6206, 1);
+const ERROR_VALUE: Variable<u8> = DICTIONARY.variable(0x6207, 1);
+const MEASURED: Variable<i16> = DICTIONARY.variable(0x6401, 1);
+const INTERRUPT: Variable<u8> = DICTIONARY.variable(0x6423, 0);
+const DELTA: Variable<u32> = DICTIONARY.variable(0x6426, 1);
 
 // ------------------------------------------------------------------------------------------------------- application
 
@@ -116,12 +116,12 @@ impl Io {
     fn sample(&mut self, image: &mut [u8]) -> bool {
         self.steady = if self.inputs == self.last { (self.steady + 1).min(FILTER_READS) } else { 0 };
         self.last = self.inputs;
-        let slow = if self.steady < FILTER_READS { FILTER.u8(image) } else { 0 };
+        let slow = if self.steady < FILTER_READS { FILTER.get(image) } else { 0 };
         self.filtered = self.filtered & slow | self.inputs & !slow;
-        READ.store(image, [self.filtered ^ POLARITY_IN.u8(image)]);
-        MEASURED.store(image, self.analogue.to_le_bytes());
+        READ.set(image, self.filtered ^ POLARITY_IN.get(image));
+        MEASURED.set(image, self.analogue);
         let change = u32::from(self.analogue.abs_diff(self.sent));
-        let is_due = INTERRUPT.u8(image) != 0 && change != 0 && change >= DELTA.u32(image);
+        let is_due = INTERRUPT.get(image) != 0 && change != 0 && change >= DELTA.get(image);
         if is_due {
             self.sent = self.analogue;
         }
@@ -130,12 +130,12 @@ impl Io {
 
     /// Applies the written outputs.
     fn write_outputs(&mut self, image: &[u8]) {
-        self.set(WRITE.u8(image) ^ POLARITY_OUT.u8(image));
+        self.set(WRITE.get(image) ^ POLARITY_OUT.get(image));
     }
 
     /// Sets the outputs to their error values, when nobody controls them any more.
     fn fail(&mut self, image: &[u8]) {
-        let (mode, value) = (ERROR_MODE.u8(image), ERROR_VALUE.u8(image));
+        let (mode, value) = (ERROR_MODE.get(image), ERROR_VALUE.get(image));
         self.set(self.outputs & !mode | value & mode);
     }
 

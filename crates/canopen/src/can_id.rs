@@ -5,6 +5,10 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CanId(u16);
 
+/// The restricted CAN-IDs (CiA 301, 7.3.5), as first and last of each range.
+const RESTRICTED: [(u16, u16); 6] =
+    [(0x000, 0x07F), (0x101, 0x180), (0x581, 0x5FF), (0x601, 0x67F), (0x6E0, 0x6FF), (0x701, 0x7FF)];
+
 impl CanId {
     /// NMT commands (CiA 301, 7.3.5).
     pub const NMT: CanId = CanId(0x000);
@@ -53,8 +57,17 @@ impl CanId {
     /// CiA 301 reserves (7.3.5, restricted CAN-IDs).
     #[must_use]
     #[inline(never)]
+    #[allow(clippy::indexing_slicing, reason = "the index is below the length")]
     pub const fn is_restricted(self) -> bool {
-        matches!(self.0, 0x000..=0x07F | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..)
+        let mut i = 0;
+        while i < RESTRICTED.len() {
+            let (first, last) = RESTRICTED[i];
+            if first <= self.0 && self.0 <= last {
+                return true;
+            }
+            i += 1;
+        }
+        false
     }
 }
 

@@ -21,6 +21,7 @@ pub mod emcy;
 mod frame;
 pub mod guide;
 mod heartbeat;
+pub mod indicators;
 pub mod lss;
 pub mod nmt;
 mod node_id;
@@ -35,7 +36,7 @@ mod transmit;
 
 pub use can_id::{CanId, CobId};
 pub use device::{
-    Action, Application, BusEvent, Definition, Device, Job, Next, ServiceDevice, Soundness, Stored,
+    Action, Application, BusEvent, Damage, Definition, Device, Job, Next, ServiceDevice, Soundness, Stored,
 };
 pub use emcy::{Condition, ErrorClass, Fault};
 pub use frame::Frame;

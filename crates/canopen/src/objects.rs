@@ -33,7 +33,7 @@ mod storing;
 
 use crate::dictionary::{Access, DefaultValue, Group, Object, Rule, Type, fail};
 
-pub use pdo::{multiplexed, rpdo, rpdos, tpdo, tpdos};
+pub use pdo::{multiplexed, rpdo, rpdos, tpdo, tpdos, without_remote};
 pub use program::{flash_status, program_control, program_data, program_identification};
 pub use sdo::{default_sdo_server, sdo_client, sdo_server};
 pub use storing::{restore_parameters, restore_parameters_with, store_parameters, store_parameters_with};

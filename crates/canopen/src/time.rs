@@ -1,5 +1,6 @@
 //! Time in microseconds. The caller passes the time to every call; this crate reads no clock.
 
+use core::cmp::Ordering;
 use core::ops::Add;
 
 /// A time span in microseconds.
@@ -65,22 +66,50 @@ impl Span {
 ///
 /// The services of a device reach at most 71 minutes into the future and [`Clock::PAST`] into the past, so 32 bits are
 /// enough for them. They take half the code and half the memory of 64 bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Tick(pub(crate) u32);
+///
+/// The number counts down to 0 for [`NEVER`](Tick::NEVER): most timers of a new device do not run, and zeros take the
+/// least code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tick(u32);
+
+impl PartialOrd for Tick {
+    fn partial_cmp(&self, other: &Tick) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Tick {
+    fn cmp(&self, other: &Tick) -> Ordering {
+        other.0.cmp(&self.0)
+    }
+}
 
 impl Tick {
     /// Later than any other tick: no deadline.
-    pub(crate) const NEVER: Tick = Tick(u32::MAX);
+    pub(crate) const NEVER: Tick = Tick(0);
+
+    /// Earlier than any other tick: due at once.
+    pub(crate) const PAST: Tick = Tick(u32::MAX);
+
+    /// The tick after this time since the epoch.
+    pub(crate) const fn since_epoch(microseconds: u32) -> Tick {
+        Tick(!microseconds)
+    }
+
+    /// The time since an earlier tick in microseconds; 0 for a later one.
+    pub(crate) const fn since(self, earlier: Tick) -> u32 {
+        earlier.0.saturating_sub(self.0)
+    }
 
     /// The end of a span that begins now or in the past.
     #[inline]
     pub(crate) const fn plus(self, span: Span) -> Tick {
-        Tick(self.0 + span.0)
+        Tick(self.0 - span.0)
     }
 
     /// The end of a span of any length. The end is at most 71 minutes after the present.
     pub(crate) fn plus_long(self, microseconds: u32) -> Tick {
-        Tick(self.0.saturating_add(microseconds).min(u32::MAX - 1))
+        Tick(self.0.saturating_sub(microseconds).max(1))
     }
 
     /// The next due tick of a timer with a period in milliseconds, 0 for none. It is one period after this due tick, so
@@ -96,11 +125,11 @@ impl Tick {
         if next > now { next } else { now.plus(period) }
     }
 
-    /// The epoch has moved by a span. A tick before the new epoch becomes 0: it is long past.
+    /// The epoch has moved by a span. A tick before the new epoch becomes the epoch: it is long past.
     #[inline(never)]
     pub(crate) fn shift(&mut self, by: Span) {
         if *self != Tick::NEVER {
-            self.0 = self.0.saturating_sub(by.0);
+            self.0 = self.0.saturating_add(by.0);
         }
     }
 }
@@ -125,7 +154,7 @@ impl Clock {
     #[inline]
     pub(crate) fn tick(&self, now: Instant) -> Option<Tick> {
         let since = now.0.wrapping_sub(self.epoch);
-        u32::try_from(since).ok().filter(|since| *since < Clock::LATEST).map(Tick)
+        u32::try_from(since).ok().filter(|since| *since < Clock::LATEST).map(Tick::since_epoch)
     }
 
     /// Moves the epoch towards the present. Returns the tick of the present, and the span by which all ticks of the
@@ -134,16 +163,16 @@ impl Clock {
     /// An instant before the epoch is that of a caller whose time went back: the epoch stays.
     pub(crate) fn follow(&mut self, now: Instant) -> (Tick, Span) {
         let Some(by) = now.0.saturating_sub(Clock::PAST.into()).checked_sub(self.epoch) else {
-            return (Tick(0), Span(0));
+            return (Tick::PAST, Span(0));
         };
         self.epoch += by;
-        (Tick(Clock::PAST), Span(u32::try_from(by).unwrap_or(u32::MAX)))
+        (Tick::since_epoch(Clock::PAST), Span(u32::try_from(by).unwrap_or(u32::MAX)))
     }
 
     /// The instant of a tick.
     #[inline]
     pub(crate) fn instant(&self, tick: Tick) -> Instant {
-        if tick == Tick::NEVER { Instant::NEVER } else { Instant(self.epoch.wrapping_add(tick.0.into())) }
+        if tick == Tick::NEVER { Instant::NEVER } else { Instant(self.epoch.wrapping_add((!tick.0).into())) }
     }
 }
 
@@ -173,7 +202,7 @@ mod tests {
     fn no_deadline_stays_none_and_what_is_long_past_stays_past() {
         let mut clock = Clock::new();
         let (now, by) = clock.follow(Instant(u64::MAX / 2));
-        let (mut never, mut past) = (Tick::NEVER, Tick(5));
+        let (mut never, mut past) = (Tick::NEVER, Tick::since_epoch(5));
         never.shift(by);
         past.shift(by);
         assert_eq!((never, clock.instant(never)), (Tick::NEVER, Instant::NEVER));

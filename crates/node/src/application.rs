@@ -6,12 +6,12 @@ use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, ErrorClass, Part, Soundness};
 use profiles::communication::{
-    LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL,
+    LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL, UPDATE_LOG,
 };
 use profiles::fault::Flags;
 use profiles::lift::objects::{SWITCHED_OFF, UNKNOWN_CHOICES};
 use profiles::{AnyProfile, Snapshot};
-use update::{Authorisation, Programs};
+use update::{Authorisation, Log, Programs};
 
 use crate::Setup;
 use crate::configured::Configured;
@@ -42,6 +42,8 @@ pub(crate) struct NodeApplication {
     pub(crate) trial: ProgramTrial,
     /// The programs in the flash (2004h).
     pub(crate) programs: Programs,
+    /// The log of updates (2006h).
+    pub(crate) update_log: Log,
     /// Permission to change the program (2003h).
     pub(crate) authorisation: Authorisation,
     buffer: TransferBuffer,
@@ -60,6 +62,7 @@ impl NodeApplication {
             lost_events: [0; LOST_EVENTS],
             trial: ProgramTrial::default(),
             programs: Programs::default(),
+            update_log: Log::EMPTY,
             authorisation: Authorisation::default(),
             buffer: TransferBuffer::EMPTY,
         }
@@ -111,6 +114,7 @@ impl NodeApplication {
 
 impl Application for NodeApplication {
     const CONDITIONS: &'static [Condition] = &CONDITIONS;
+    const SENDS_EVENTS: bool = true;
 
     fn register_bits(&self) -> u8 {
         self.profile.register_bits()
@@ -122,9 +126,9 @@ impl Application for NodeApplication {
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
         show(0x1009, 0, setup.hardware_version.as_bytes());
         show(0x100A, 0, setup.software_version.as_bytes());
-        show(0x1018, 1, &product::VENDOR_ID.to_le_bytes());
+        show(0x1018, 1, &profiles::product::VENDOR_ID.to_le_bytes());
         show(0x1018, 2, &setup.personality.product_code().to_le_bytes());
-        show(0x1018, 3, &product::REVISION.to_le_bytes());
+        show(0x1018, 3, &profiles::product::REVISION.to_le_bytes());
         show(0x1018, 4, &setup.serial_number.to_le_bytes());
         show(0x1F56, 1, &setup.program_id.to_le_bytes());
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
@@ -149,7 +153,7 @@ impl Application for NodeApplication {
         match entry.index() {
             PROGRAM_TRIAL => {
                 let is_at_work = self.has_measured();
-                self.trial.command(bytes, is_at_work)
+                self.trial.command(bytes, is_at_work, self.commander())
             }
             PROGRAM_AUTHORISATION => self.answer(bytes, image),
             _ => self.profile.write(entry, bytes, image),
@@ -235,8 +239,8 @@ impl Application for NodeApplication {
         self.admit(entry.index(), entry.sub())
     }
 
-    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
-        self.buffer.read()
+    fn read_domain(&self, at: Multiplexer) -> Result<&[u8], Abort> {
+        if at.index == UPDATE_LOG { Ok(self.update_log.bytes()) } else { self.buffer.read() }
     }
 
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {

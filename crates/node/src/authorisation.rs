@@ -4,7 +4,7 @@
 use canopen::dictionary::{Group, Groups};
 use canopen::sdo::Abort;
 use profiles::communication::{PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL};
-use update::Authorisation;
+use update::{Authorisation, Cause};
 
 use crate::Protocol;
 use crate::application::NodeApplication;
@@ -41,6 +41,11 @@ impl NodeApplication {
         let is_right = bytes.try_into().is_ok_and(|response| self.authorisation.answer(response));
         self.show_authorisation(image);
         if is_right { Ok(()) } else { Err(Abort::InvalidValue) }
+    }
+
+    /// Who gives a command that [`admit`](Self::admit) accepts: the holder of the key, if there is a key.
+    pub(crate) fn commander(&self) -> Cause {
+        if self.authorisation.asks() { Cause::Holder } else { Cause::Command }
     }
 
     pub(crate) fn show_authorisation(&self, image: &mut [u8]) {

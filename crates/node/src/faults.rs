@@ -8,27 +8,46 @@ use crate::{Next, Protocol, fault};
 
 /// Milliseconds for which a fault of the profile must be absent before its end is reported. A loose contact that fails
 /// many times a second is one fault and fills neither the bus nor 1003h.
-const HOLD: u8 = 100;
+const HOLD: u16 = 100;
+/// The same for a fault that has come back: a contact that fails a few times a second is one fault as well.
+const LONG_HOLD: u16 = 1000;
+/// Milliseconds after the reported end in which a fault comes back.
+const MEMORY: u16 = 2000;
 
 /// The faults of the profile that are reported: one bit for each, in the order of the profile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shown {
     faults: u32,
-    /// Milliseconds until the end of a fault is reported, for each bit.
-    left: [u8; 32],
+    /// The faults that have come back.
+    repeated: u32,
+    /// Milliseconds until a fault is forgotten, for each bit. Above `MEMORY`, its end is not reported yet.
+    left: [u16; 32],
+    /// Whether a fault is not forgotten.
+    is_counting: bool,
 }
 
 impl Shown {
     /// Takes the faults of a millisecond. Returns the faults whose report changes.
     pub(crate) fn update(&mut self, present: u32) -> u32 {
-        if present | self.faults == 0 {
+        if present == 0 && !self.is_counting {
             return 0;
         }
-        let mut faults = 0;
-        for (bit, left) in (0..).zip(&mut self.left) {
-            *left = if present >> bit & 1 != 0 { HOLD } else { left.saturating_sub(1) };
-            faults |= u32::from(*left > 0) << bit;
+        let (mut faults, mut counting) = (0, 0);
+        for (place, left) in (0..).zip(&mut self.left) {
+            let bit = 1 << place;
+            if present & bit != 0 {
+                if (1..=MEMORY).contains(left) {
+                    self.repeated |= bit;
+                }
+                *left = MEMORY + if self.repeated & bit != 0 { LONG_HOLD } else { HOLD };
+            } else {
+                *left = left.saturating_sub(1);
+            }
+            faults |= if *left > MEMORY { bit } else { 0 };
+            counting |= if *left > 0 { bit } else { 0 };
         }
+        self.repeated &= counting;
+        self.is_counting = counting != 0;
         faults ^ core::mem::replace(&mut self.faults, faults)
     }
 }
@@ -72,5 +91,38 @@ impl Protocol {
             }
             bit <<= 1;
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of reports in 20 s of a fault that lasts 10 ms and comes back after each period.
+    fn reports(period: u32) -> u32 {
+        let mut shown = Shown::default();
+        (0..20_000).map(|ms| shown.update(u32::from(ms % period < 10)).count_ones()).sum()
+    }
+
+    #[test]
+    fn a_loose_contact_sends_no_stream_of_reports() {
+        // More often than ten times a second it is one fault.
+        assert_eq!(reports(20), 1);
+        // The first end, and then one fault.
+        for period in [120, 200, 500, 990] {
+            assert_eq!(reports(period), 3, "every {period} ms");
+        }
+        assert_eq!(reports(1500), 2 * 14 - 1, "every 1.5 s; the last end is later");
+    }
+
+    #[test]
+    fn a_fault_after_a_long_time_ends_soon() {
+        let mut shown = Shown::default();
+        for _ in 0..3 {
+            assert_eq!(shown.update(1), 1);
+            let end = (1..).find(|_| shown.update(0) == 1);
+            assert_eq!(end, Some(HOLD));
+            assert!((0..MEMORY).all(|_| shown.update(0) == 0));
+        }
     }
 }

@@ -4,6 +4,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 use storage::{DeviceRecord, Health, View};
 
 use crate::Fault;
+use crate::device_value::DeviceValue;
 use crate::fault::{BOOT_DATA, OLDER_BOOT_DATA};
 
 /// The device record at the start of the node.
@@ -20,7 +21,7 @@ impl Identity {
     #[inline(never)]
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Identity {
         let record = view.device().ok().flatten();
-        let is_stored = !matches!(view.load(DeviceRecord::NUMBER, &mut [0; DeviceRecord::ROOM]), Ok(None));
+        let is_stored = DeviceValue::view(view).has_device();
         let fault = match (view.health(DeviceRecord::NUMBER), record) {
             (Health::Good, Some(_)) => None,
             (Health::Good, None) => is_stored.then_some(&BOOT_DATA),

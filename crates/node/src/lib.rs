@@ -15,6 +15,7 @@
 mod application;
 mod authorisation;
 mod configured;
+mod device_value;
 pub mod fault;
 mod faults;
 mod identity;
@@ -35,6 +36,7 @@ pub use application::LOST_EVENTS;
 pub use canopen::lss::BitRate;
 pub use canopen::nmt::State;
 pub use canopen::{Action, BusEvent, Frame, Instant, Next, NodeId, QueueFull, Transmit};
+pub use device_value::{log_event, stored_log};
 pub use fault::FAULTS;
 pub use identity::Identity;
 pub use memory::{EraseBudget, MemoryState, ParameterMemory};

@@ -1,21 +1,12 @@
 //! Record about the retained state, which no object shows: the data about positions that a start with an empty battery
-//! needs. It is stored behind the device record, in the same value. Both are facts of the device, which 1011h does not
-//! affect.
+//! needs. It is stored behind the device record, in the same value.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use profiles::board::{POSITION_RECORD_WORDS, RETAINED_WORDS};
 use profiles::encoder::PositionRecord;
-use storage::{Change, DeviceRecord, Error, Loaded, Store, View};
+use storage::{Error, Store, View};
 
-/// The bytes of a device record.
-type Device = [u8; DeviceRecord::LEN];
-/// The bytes of a stored value: the device record, and the record about the retained state.
-type Value = [u8; DeviceRecord::ROOM];
-
-/// Bytes behind the device record.
-const TAIL: usize = 4 * POSITION_RECORD_WORDS;
-const WHOLE: usize = DeviceRecord::LEN + TAIL;
-const _: () = assert!(WHOLE <= DeviceRecord::ROOM);
+use crate::device_value::{Device, DeviceValue, Positions};
 
 /// Keeps the stored record up to date.
 #[derive(Debug)]
@@ -35,10 +26,8 @@ impl StoredPositionRecord {
 
     /// The stored record; `None` if nothing is stored, or nothing that can be read.
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; POSITION_RECORD_WORDS]> {
-        let mut value: Value = [0; DeviceRecord::ROOM];
-        let loaded = view.load(DeviceRecord::NUMBER, &mut value);
-        let tail = tail(loaded, &value)?.as_chunks::<4>().0;
-        let words: &[[u8; 4]; POSITION_RECORD_WORDS] = tail.try_into().ok()?;
+        let positions = DeviceValue::view(view).positions?;
+        let words: &[[u8; 4]; POSITION_RECORD_WORDS] = positions.as_chunks::<4>().0.try_into().ok()?;
         Some(words.map(u32::from_le_bytes))
     }
 
@@ -59,42 +48,20 @@ impl StoredPositionRecord {
             return Ok(false);
         }
         self.stored = Some(now);
-        let mut bytes = [0; TAIL];
+        let mut bytes: Positions = Default::default();
         for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now.to_words()) {
             *to = word.to_le_bytes();
         }
-        save(*device, &bytes, store)?;
+        let log = DeviceValue::read(store).log;
+        DeviceValue { device: *device, log, positions: Some(bytes) }.save(store)?;
         Ok(true)
     }
-}
-
-/// Replaces the device record, and keeps the bytes behind it.
-pub(crate) fn replace_device<F: NorFlash>(
-    device: Device,
-    store: &mut Store<F>,
-) -> Result<(), Error<F::Error>> {
-    let mut value: Value = [0; DeviceRecord::ROOM];
-    let loaded = store.load(DeviceRecord::NUMBER, &mut value);
-    save(device, tail(loaded, &value).unwrap_or_default(), store)
-}
-
-/// The bytes behind the device record.
-fn tail<E>(loaded: Result<Option<Loaded>, Error<E>>, value: &Value) -> Option<&[u8]> {
-    let loaded = loaded.ok()??;
-    let is_whole = (loaded.version, loaded.len) == (DeviceRecord::VERSION, WHOLE);
-    value.get(DeviceRecord::LEN..WHOLE).filter(|_| is_whole)
-}
-
-fn save<F: NorFlash>(device: Device, tail: &[u8], store: &mut Store<F>) -> Result<(), Error<F::Error>> {
-    let mut value: Value = [0; DeviceRecord::ROOM];
-    value.iter_mut().zip(device.iter().chain(tail)).for_each(|(to, from)| *to = *from);
-    let value = value.get(..DeviceRecord::LEN + tail.len()).unwrap_or(&value);
-    store.save(&[Change::Set { group: DeviceRecord::NUMBER, version: DeviceRecord::VERSION, value }])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device_value::replace_device;
     use storage::{Memory, Pages};
 
     const PAGES: Pages = Pages::new(0, 4 * 1024);

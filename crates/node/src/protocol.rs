@@ -1,5 +1,6 @@
 //! The protocol half: the CANopen device and its state.
 
+use canopen::indicators::{BusHealth, Indicators};
 use canopen::lss::BitRate;
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
@@ -72,6 +73,12 @@ impl Protocol {
     #[must_use]
     pub fn state(&self) -> State {
         self.device.state()
+    }
+
+    /// What the indicators RUN and ERROR show.
+    #[must_use]
+    pub fn indicators(&self, bus: BusHealth) -> Indicators {
+        self.device.indicators(bus)
     }
 
     /// Whether the node works: it has sent its boot-up message, and values were measured.

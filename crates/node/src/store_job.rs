@@ -8,8 +8,8 @@ use heapless::Vec;
 use profiles::{IMAGE_SIZE, Personality};
 use storage::{Change, DeviceRecord, Error, Store};
 
+use crate::device_value;
 use crate::packed::{PackedGroups, number_of};
-use crate::position_record;
 use crate::stored::{layout, layout_of};
 
 /// A job for the parameter store with all its data. One is enough, because there is one job at a time.
@@ -47,7 +47,7 @@ impl StoreJob {
     pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
         self.pack();
         if let Some(Job::Configure(_) | Job::Setting(_)) = self.job {
-            return position_record::replace_device(self.device, store).map_err(|error| abort_of(&error));
+            return device_value::replace_device(self.device, store).map_err(|error| abort_of(&error));
         }
         let changes = match self.job {
             None | Some(Job::Configure(_) | Job::Setting(_)) => Vec::new(),

@@ -1,8 +1,8 @@
 //! A copy of the stored dictionary values in RAM for later resets, because reset communication must not wait for the
 //! flash.
 
-use canopen::Soundness;
-use canopen::dictionary::{Group, Groups};
+use canopen::dictionary::Group;
+use canopen::{Damage, Soundness};
 use embedded_storage::nor_flash::ReadNorFlash;
 use profiles::Personality;
 use storage::{Health, View};
@@ -27,15 +27,11 @@ pub(crate) fn layout_of(group: Group, layout: u16) -> u16 {
 #[derive(Debug)]
 pub(crate) struct Stored {
     packed: PackedGroups,
-    /// The groups that cannot be read at all.
-    lost: Groups,
-    /// The groups whose last stored values cannot be read, so older ones are in use.
-    older: Groups,
+    damage: Damage,
 }
 
 impl Stored {
-    pub(crate) const NOTHING: Stored =
-        Stored { packed: PackedGroups::EMPTY, lost: Groups::NONE, older: Groups::NONE };
+    pub(crate) const NOTHING: Stored = Stored { packed: PackedGroups::EMPTY, damage: Damage::NONE };
 
     /// Reads all groups. A group that cannot be read counts as not stored, and as a fault.
     pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
@@ -46,31 +42,28 @@ impl Stored {
                 is_readable = read.is_some();
                 read.unwrap_or(0)
             });
-            let health = if is_readable { view.health(number_of(group)) } else { Health::Lost };
-            self.lost.set(group, health == Health::Lost);
-            self.older.set(group, health == Health::FellBack);
+            let soundness = match view.health(number_of(group)) {
+                Health::Good if is_readable => Soundness::Whole,
+                Health::FellBack if is_readable => Soundness::Older,
+                _ => Soundness::Lost,
+            };
+            self.damage.set(group, soundness);
         }
     }
 
     /// Takes values that have just been stored.
     pub(crate) fn replace(&mut self, group: Group, packed: &[u8]) {
         let fits = self.packed.replace(group, packed);
-        self.lost.set(group, !fits);
-        self.older.set(group, false);
+        self.damage.set(group, if fits { Soundness::Whole } else { Soundness::Lost });
     }
 
     /// 1F57h:1 of the running program (CiA 302-3): 0, or code 3 (format or CRC error) in bits 1 to 7.
     pub(crate) fn flash_status(&self) -> u32 {
-        if (self.lost, self.older) == (Groups::NONE, Groups::NONE) { 0 } else { 3 << 1 }
+        if self.damage == Damage::NONE { 0 } else { 3 << 1 }
     }
 
     pub(crate) fn get(&self, group: Group) -> canopen::Stored<'_> {
-        let soundness = match (self.lost.contains(group), self.older.contains(group)) {
-            (true, _) => Soundness::Lost,
-            (_, true) => Soundness::Older,
-            _ => Soundness::Whole,
-        };
-        canopen::Stored { packed: self.packed.get(group), soundness }
+        canopen::Stored { packed: self.packed.get(group), soundness: self.damage.of(group) }
     }
 }
 

@@ -4,7 +4,7 @@ use canopen::sdo::Abort;
 use canopen::{CanId, Duration, Frame, Instant};
 use profiles::Snapshot;
 use profiles::communication::{PROGRAM_STATE, PROGRAM_TRIAL};
-use update::{Programs, Reason, Refusal, Status, Trial};
+use update::{Cause, Log, Programs, Reason, Refusal, Status, Trial};
 
 use crate::Protocol;
 use crate::application::NodeApplication;
@@ -24,9 +24,9 @@ const FAREWELL: Duration = Duration::from_millis(20);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The program works: [`Trial::confirm`].
-    Confirm,
+    Confirm(Cause),
     /// The previous program must come back: [`Trial::withdraw`], and a reset.
-    TakeBack,
+    TakeBack(Cause),
 }
 
 /// The state of the trial in the running program.
@@ -65,11 +65,11 @@ impl ProgramTrial {
     }
 
     /// Handles a write to 2002h:2.
-    pub(crate) fn command(&mut self, bytes: &[u8], is_at_work: bool) -> Result<(), Abort> {
+    pub(crate) fn command(&mut self, bytes: &[u8], is_at_work: bool, who: Cause) -> Result<(), Abort> {
         let verdict = match <[u8; 4]>::try_from(bytes) {
-            Ok(CONFIRM) if is_at_work => Verdict::Confirm,
+            Ok(CONFIRM) if is_at_work => Verdict::Confirm(who),
             Ok(CONFIRM) => return Err(Abort::DeviceState),
-            Ok(TAKE_BACK) => Verdict::TakeBack,
+            Ok(TAKE_BACK) => Verdict::TakeBack(who),
             _ => return Err(Abort::InvalidValue),
         };
         if self.state != Trial::Open {
@@ -90,6 +90,11 @@ impl Protocol {
     pub fn set_programs(&mut self, programs: Programs) {
         self.device.application_mut().programs = programs;
         self.device.show(|application, image| application.show_programs(image));
+    }
+
+    /// Takes the log of updates.
+    pub fn set_update_log(&mut self, log: Log) {
+        self.device.application_mut().update_log = log;
     }
 
     /// Whether the program is still on trial. Until then stored data must stay as the previous program has stored it,
@@ -147,9 +152,9 @@ impl Protocol {
         let is_addressed = self.device.application().trial.is_addressed;
         let is_confirmed = is_addressed && is_past(Some(CONFIRMATION)) || is_past(automatic);
         if is_well && is_confirmed {
-            Some(Verdict::Confirm)
+            Some(Verdict::Confirm(if is_addressed { Cause::Master } else { Cause::Time }))
         } else {
-            is_past(limit).then_some(Verdict::TakeBack)
+            is_past(limit).then_some(Verdict::TakeBack(Cause::Time))
         }
     }
 
@@ -175,8 +180,10 @@ impl NodeApplication {
     }
 
     pub(crate) fn show_programs(&self, image: &mut [u8]) {
-        let Programs { counter, generation, staged, kept } = self.programs;
+        let Programs { counter, generation, staged, kept, erases, clears_allowed } = self.programs;
         self.show(PROGRAM_STATE, 3, &[(generation & 0xFF) as u8], image);
+        self.show(PROGRAM_STATE, 6, &erases.to_le_bytes(), image);
+        self.show(PROGRAM_STATE, 7, &[clears_allowed], image);
         for (sub, word) in [(2, counter), (4, staged), (5, kept)] {
             self.show(PROGRAM_STATE, sub, &word.to_le_bytes(), image);
         }

@@ -17,6 +17,7 @@ pub mod communication;
 pub mod fault;
 mod list;
 pub mod pair;
+pub mod product;
 pub mod profile;
 pub mod table;
 

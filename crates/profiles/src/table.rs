@@ -82,7 +82,7 @@ pub const fn larger(a: usize, b: usize) -> usize {
 /// Whether the application decides on writes to the object of the row.
 #[must_use]
 pub const fn is_handled(row: &Object) -> bool {
-    matches!(row.rule, Rule::Application) && !matches!(row.kind, Type::Domain)
+    matches!(row.rule(), Rule::Application) && !matches!(row.kind, Type::Domain)
 }
 
 /// The storage groups that a table has rows of, one bit for each.

@@ -18,7 +18,7 @@ impl DeviceRecord {
     /// Length of the stored record in bytes.
     pub const LEN: usize = 4;
     /// Largest size of the value in bytes: other facts of the device may follow the record.
-    pub const ROOM: usize = 16;
+    pub const ROOM: usize = 144;
     /// The node-ID of a device that has none yet (CiA 305: LSS must assign one).
     pub const UNCONFIGURED: u8 = 255;
     /// The bit rate that asks for automatic detection.

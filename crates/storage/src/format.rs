@@ -1,6 +1,6 @@
 //! The words of a page; the documentation of the crate has a picture. All numbers are little-endian.
 
-use checksum::Digest;
+use crate::checksum::{self, Digest};
 
 use crate::group::GroupSet;
 

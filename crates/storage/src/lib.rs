@@ -119,6 +119,9 @@
 #[cfg(any(test, feature = "mock"))]
 extern crate std;
 
+#[cfg(feature = "mock")]
+pub mod cells;
+pub mod checksum;
 mod device;
 mod error;
 mod format;

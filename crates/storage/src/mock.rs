@@ -4,10 +4,10 @@ use std::ops::{Deref, DerefMut};
 use std::vec;
 use std::vec::Vec;
 
-use cells::Cells;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write};
 
-pub use cells::{PowerCut, Weak};
+use crate::cells::Cells;
+pub use crate::cells::{PowerCut, Weak};
 
 /// A flash that is erased in units of `ERASE` bytes and programmed in words of `WORD`. Its [`Cells`] define the power
 /// cuts.

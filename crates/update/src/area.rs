@@ -6,6 +6,9 @@ use crate::header::HEADER;
 use crate::record::RECORD_ROOM;
 use crate::security::Security;
 
+/// Bytes of the largest word of a flash.
+const LARGEST_WORD: u32 = 8;
+
 /// Consecutive sectors of any sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
@@ -62,6 +65,8 @@ impl Area {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     security: Area,
+    /// The offset of the first word, and that of the last one.
+    wear: (u32, u32),
     application: Area,
     staging: Area,
     kept: Area,
@@ -70,8 +75,15 @@ pub struct Layout {
 impl Layout {
     /// A layout; `None` if there is no room for an image or for a security counter.
     #[must_use]
-    pub const fn new(security: Area, application: Area, staging: Area, kept: Area) -> Option<Layout> {
-        let layout = Layout { security, application, staging, kept };
+    pub const fn new(
+        security: Area,
+        wear: Area,
+        application: Area,
+        staging: Area,
+        kept: Area,
+    ) -> Option<Layout> {
+        let wear = (wear.start(), wear.end().saturating_sub(LARGEST_WORD));
+        let layout = Layout { security, wear, application, staging, kept };
         let fits = layout.longest_image() > HEADER && layout.highest_counter() > 0;
         if fits { Some(layout) } else { None }
     }
@@ -80,6 +92,11 @@ impl Layout {
     #[must_use]
     pub const fn security(&self) -> Area {
         self.security
+    }
+
+    /// The offsets of the first and of the last of the words that count erases, which nothing ever erases either.
+    pub(crate) const fn wear(&self) -> (u32, u32) {
+        self.wear
     }
 
     /// The area where the application runs: its header, then its vector table.
@@ -138,7 +155,7 @@ mod tests {
         let (security, application) = (Area::new(0, &[2048]), Area::new(2048, &[1024, 2048]));
         let (short, long) = (Area::new(5120, &[2048, 1024]), Area::new(5120, &[2048, 2048]));
         let longest =
-            |staging, kept| Layout::new(security, application, staging, kept).unwrap().longest_image();
+            |staging, kept| Layout::new(security, security, application, staging, kept).unwrap().longest_image();
         assert_eq!(longest(long, long), 3072);
         assert_eq!(longest(short, long), 2560, "the commit record takes 512");
         assert_eq!(longest(long, short), 2560, "the record of the kept image does so");
@@ -147,10 +164,10 @@ mod tests {
     #[test]
     fn areas_that_are_too_small_are_refused() {
         let (security, image) = (Area::new(0, &[2048]), Area::new(2048, &[2048]));
-        assert!(Layout::new(security, image, image, image).is_some());
-        assert!(Layout::new(Area::new(0, &[1024]), image, image, image).is_none());
-        assert!(Layout::new(security, Area::new(2048, &[512]), image, image).is_none());
-        assert!(Layout::new(security, image, Area::new(2048, &[1024]), image).is_none());
-        assert!(Layout::new(security, image, image, Area::new(2048, &[1024])).is_none());
+        assert!(Layout::new(security, security, image, image, image).is_some());
+        assert!(Layout::new(Area::new(0, &[1024]), security, image, image, image).is_none());
+        assert!(Layout::new(security, security, Area::new(2048, &[512]), image, image).is_none());
+        assert!(Layout::new(security, security, image, Area::new(2048, &[1024]), image).is_none());
+        assert!(Layout::new(security, security, image, image, Area::new(2048, &[1024])).is_none());
     }
 }

@@ -27,15 +27,13 @@ impl Crashes {
     /// The count in a word of RAM; 0 if the word is invalid, for example after power-up.
     #[must_use]
     pub fn from_word(word: u32) -> Crashes {
-        let [count, ..] = word.to_le_bytes();
-        let crashes = Crashes(count);
-        if crashes.word() == word { crashes } else { Crashes(0) }
+        Crashes(unsealed(word))
     }
 
-    /// The word to store: the count, and its complement in the other three bytes.
+    /// The word to store.
     #[must_use]
     pub fn word(self) -> u32 {
-        u32::from_le_bytes([self.0, !self.0, !self.0, !self.0])
+        sealed(self.0)
     }
 
     /// The count after a reset.
@@ -59,6 +57,18 @@ impl Crashes {
     pub fn count(self) -> u8 {
         self.0
     }
+}
+
+/// A count as a word of RAM: the count, and its complement in the other three bytes.
+pub(crate) fn sealed(count: u8) -> u32 {
+    u32::from_le_bytes([count, !count, !count, !count])
+}
+
+/// The count in a word of RAM; 0 if the word is invalid, for example after power-up.
+#[inline(never)] // Little room in flash.
+pub(crate) fn unsealed(word: u32) -> u8 {
+    let [count, ..] = word.to_le_bytes();
+    if sealed(count) == word { count } else { 0 }
 }
 
 #[cfg(test)]

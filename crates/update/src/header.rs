@@ -88,8 +88,17 @@ impl Header {
         let Description { board, hardware, version, counter, keys } = description;
         let Version { major, minor, patch } = version;
         let number = u32::from(major) | u32::from(minor) << 16;
-        let words =
-            [MAGIC, FORMAT, board, hardware, number, patch.into(), length, checksum::of(code), counter];
+        let words = [
+            MAGIC,
+            FORMAT,
+            board,
+            hardware,
+            number,
+            patch.into(),
+            length,
+            storage::checksum::of(code),
+            counter,
+        ];
         let words = words.into_iter().flat_map(u32::to_le_bytes);
         let mut header = Header::EMPTY;
         header.0.iter_mut().zip(words.chain(keys.encode())).for_each(|(to, byte)| *to = byte);
@@ -101,7 +110,7 @@ impl Header {
     pub fn with_signature(mut self, signature: [u8; SIGNATURE_LEN]) -> Header {
         self.0.iter_mut().skip(SIGNED_LEN).zip(signature).for_each(|(to, byte)| *to = byte);
         if let Some((content, crc)) = self.0.split_last_chunk_mut() {
-            *crc = checksum::of(content).to_le_bytes();
+            *crc = storage::checksum::of(content).to_le_bytes();
         }
         self
     }
@@ -109,17 +118,22 @@ impl Header {
     /// Properties of the image.
     #[must_use]
     pub fn description(&self) -> Description {
-        let number = self.word(VERSION);
         Description {
             board: self.board(),
             hardware: self.hardware(),
-            version: Version { major: low(number), minor: low(number >> 16), patch: low(self.word(PATCH)) },
+            version: self.version(),
             counter: self.counter(),
             keys: KeyList {
                 release: self.certificate(Rank::Release).map(Certificate::from_bytes),
                 root: self.certificate(Rank::Root).map(Certificate::from_bytes),
             },
         }
+    }
+
+    /// The version of the image.
+    pub(crate) fn version(&self) -> Version {
+        let number = self.word(VERSION);
+        Version { major: low(number), minor: low(number >> 16), patch: low(self.word(PATCH)) }
     }
 
     /// The board of the image.
@@ -237,7 +251,7 @@ impl Header {
             return Err(Refusal::UnknownFormat);
         }
         let content = self.0.split_last_chunk::<CRC_LEN>().map_or(&[][..], |(content, _)| content);
-        if checksum::of(content) != self.crc() {
+        if storage::checksum::of(content) != self.crc() {
             Err(Refusal::HeaderCrc)
         } else if self.is_sensible() {
             Ok(())

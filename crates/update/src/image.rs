@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use checksum::Digest;
+use storage::checksum::Digest;
 
 use crate::area::Area;
 use crate::flash::{CHUNK, Flash, PIECES, read_piece};
@@ -64,7 +64,7 @@ pub(crate) struct CrcCheck {
 
 impl CrcCheck {
     pub(crate) fn new(header: &Header, area: Area) -> CrcCheck {
-        CrcCheck { expected: header.code_crc(), rest: code(header, area), digest: checksum::begin() }
+        CrcCheck { expected: header.code_crc(), rest: code(header, area), digest: storage::checksum::begin() }
     }
 
     /// Does one step; returns whether the check is complete. The CRC is judged only at the end. The bytes are also added

@@ -11,7 +11,7 @@ pub use crate::certificate::{
 pub const KEY_LEN: usize = 32;
 
 /// The public half of the DEVELOPMENT key. Its secret half is in the repository
-/// (`tools/sign/keys/DEVELOPMENT-KEY-KNOWN-TO-EVERYBODY.pem`), so a node that trusts this key runs images signed by
+/// (`tools/programmer/keys/DEVELOPMENT-KEY-KNOWN-TO-EVERYBODY.pem`), so a node that trusts this key runs images signed by
 /// anybody.
 pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [
     0xFB, 0x87, 0x4B, 0xC8, 0xD1, 0x9E, 0xEB, 0x05, 0xB1, 0x01, 0x6F, 0x27, 0xC2, 0x7C, 0xCD, 0x9E, 0x98,

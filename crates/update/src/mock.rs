@@ -5,12 +5,12 @@ use core::ops::{Deref, DerefMut, Range};
 use std::collections::HashMap;
 use std::vec::Vec;
 
-use cells::{Cells, WORD};
 use embedded_storage::nor_flash::{ErrorType, ReadNorFlash, check_read};
+use storage::cells::{Cells, WORD};
 
 use crate::flash::Flash;
 
-pub use cells::{PowerCut, Weak};
+pub use storage::cells::{PowerCut, Weak};
 
 /// Number of polls that an erase takes.
 const ERASE_POLLS: u32 = 3;

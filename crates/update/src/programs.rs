@@ -1,9 +1,11 @@
 //! What the areas of an update tell about the programs of a node: for an object of the application.
 
 use crate::area::{Area, Layout};
+use crate::clears::Clears;
 use crate::flash::Flash;
 use crate::header::Header;
 use crate::security::Security;
+use crate::wear;
 
 /// The programs of a node. A number is 0 where the flash does not tell it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,17 +18,23 @@ pub struct Programs {
     pub staged: u32,
     /// Identification of the program that was kept before the last update.
     pub kept: u32,
+    /// Number of erases of the application area, staging and the area of the kept image together.
+    pub erases: u16,
+    /// Number of clears that the bootloader accepts now.
+    pub clears_allowed: u8,
 }
 
 impl Programs {
     /// Reads the areas.
-    pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Programs {
+    pub fn read<F: Flash>(flash: &mut F, layout: &Layout, clears: Clears) -> Programs {
         let security = Security(layout.security());
         Programs {
             counter: security.least_counter(flash),
             generation: security.least_generation(flash),
             staged: identification(flash, layout.staging()),
             kept: identification(flash, layout.kept()),
+            erases: u16::try_from(wear::erases(flash, layout)).unwrap_or(u16::MAX),
+            clears_allowed: clears.left(),
         }
     }
 }

@@ -68,6 +68,8 @@ pub enum Refusal {
     },
     /// The application is on trial: it must be confirmed or taken back before the next update.
     OnTrial,
+    /// Staging has been cleared too often: see [`crate::Clears`].
+    Worn,
 }
 
 impl Refusal {
@@ -93,6 +95,7 @@ impl Refusal {
             Refusal::TakenBack { .. } => 72,
             Refusal::OnTrial => 73,
             Refusal::CounterStep { .. } => 74,
+            Refusal::Worn => 75,
         }
     }
 

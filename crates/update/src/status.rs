@@ -81,6 +81,9 @@ impl fmt::Display for Status {
                 f,
                 "the security counter rises too far (the node takes {detail} at most without a key list that allows more)"
             ),
+            75 => f.write_str(
+                "staging was cleared too often: wait 18 minutes, or switch the power of the node off and on",
+            ),
             code => write!(f, "error {code} of the manufacturer, detail {detail}"),
         }
     }
@@ -94,7 +97,7 @@ mod tests {
     use super::*;
     use crate::trial::Reason;
 
-    const ALL: [Refusal; 20] = [
+    const ALL: [Refusal; 21] = [
         Refusal::NoProgram,
         Refusal::UnknownFormat,
         Refusal::HeaderCrc,
@@ -115,6 +118,7 @@ mod tests {
         Refusal::CounterStep { most: 70_000 },
         Refusal::TakenBack { reason: Reason::Starts },
         Refusal::OnTrial,
+        Refusal::Worn,
     ];
 
     #[test]

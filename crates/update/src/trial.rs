@@ -140,7 +140,7 @@ pub(crate) fn fail<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refus
 
 /// Whether the application has a header, but not that of the image in `area`. Without a header it is damaged, or half
 /// copied.
-fn is_another<F: Flash>(flash: &mut F, layout: &Layout, area: Area) -> bool {
+pub(crate) fn is_another<F: Flash>(flash: &mut F, layout: &Layout, area: Area) -> bool {
     let mut crc = [0; 4];
     let is_read = flash.read(area.start().saturating_add(HEADER - 4), &mut crc).is_ok();
     let mut header = Header::EMPTY;

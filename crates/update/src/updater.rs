@@ -1,6 +1,7 @@
 //! The update as a state machine that is polled: each poll does one bounded step.
 
 use crate::area::{Area, Layout};
+use crate::clears::Clears;
 use crate::copy::Copy;
 use crate::download::Download;
 use crate::erase::Erase;
@@ -12,6 +13,7 @@ use crate::refusal::Refusal;
 use crate::status::Status;
 use crate::target::Target;
 use crate::trial::{self, Trial};
+use crate::{log, wear};
 
 /// Kind of the next [`Updater::poll`], so that the caller knows when to call it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,7 +151,23 @@ impl<F: Flash> Updater<F> {
         // There is no trial: a record of the kept image that a cut has left pending must not make one later.
         let outcome = trial::kept(layout).done(flash).and_then(|()| trial::staged(layout).revoke(flash));
         self.state = State::Clearing(Erase::new(self.target.layout.staging()));
+        wear::count(&mut self.flash, &self.target.layout);
         self.settle(outcome)
+    }
+
+    /// Clears the program like [`Updater::clear`], within a budget. A clear that erases nothing costs nothing.
+    ///
+    /// # Errors
+    /// [`Refusal::Worn`] if the budget is used up, and the errors of [`Updater::clear`]. Nothing changes.
+    pub fn clear_within(&mut self, clears: &mut Clears) -> Result<(), Refusal> {
+        if clears.left() == 0 && !matches!(self.state, State::Cleared) {
+            return self.refuse(Refusal::Worn);
+        }
+        self.clear()?;
+        if matches!(self.state, State::Clearing(_)) {
+            *clears = clears.spent();
+        }
+        Ok(())
     }
 
     /// Begins a download to 1F50h. `size` in bytes, if the client has announced it.
@@ -297,7 +315,9 @@ impl<F: Flash> Updater<F> {
     fn settle(&mut self, outcome: Result<(), Refusal>) -> Result<(), Refusal> {
         if let Err(refusal) = outcome {
             self.state = State::Idle;
-            return self.refuse(refusal);
+            let refused = self.refuse(refusal);
+            log::note(&mut self.flash, &self.target.layout, self.status);
+            return refused;
         }
         self.status = Status::GOOD;
         Ok(())
@@ -371,6 +391,7 @@ impl<F: Flash> Updater<F> {
 
     /// Starts the copy of an image.
     fn replace(&mut self, plan: Plan, header: &Header) {
+        wear::count(&mut self.flash, &self.target.layout);
         let (from, to) = plan.areas(&self.target.layout);
         self.state = State::Copying(Copy::new(header, from, to), plan);
     }

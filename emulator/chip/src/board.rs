@@ -1,9 +1,10 @@
 //! The properties of the board around the chip.
 
 pub use crate::plant::FrontEnd;
-pub use crate::spi::SsiFormat;
+pub use crate::spi::{SsiFormat, SsiFormatError};
 
-use crate::plant::BUTTONS;
+/// Number of buttons on the board.
+pub const BUTTONS: usize = 2;
 
 /// A button of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

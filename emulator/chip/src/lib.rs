@@ -55,7 +55,7 @@ mod unmodelled;
 mod variant;
 
 pub use board::ButtonPin;
-pub use board::{Board, FrontEnd, SsiFormat};
+pub use board::{BUTTONS, Board, FrontEnd, SsiFormat, SsiFormatError};
 pub use clocks::Clocks;
 pub use flash::Flash;
 pub use loss::Loss;

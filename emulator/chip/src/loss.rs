@@ -25,6 +25,8 @@ pub enum Loss {
     /// The end of the frame on the bus of CAN1, for a controller that is to leave the bus: it stays on the bus until a
     /// reset, as with RX held dominant.
     LeaveBus,
+    /// A frame of CAN1 in loop-back: it is sent and not received.
+    LoopBack,
     /// A store into the backup SRAM.
     BackupStore,
 }

@@ -236,7 +236,7 @@ pub(crate) struct TimerPlace {
 }
 
 const fn timer(wide: bool, channels: u32, bus: Apb, irq: u8) -> TimerPlace {
-    TimerPlace { kind: Kind { wide, channels, requests: 0 }, bus, irq }
+    TimerPlace { kind: Kind { wide, channels, requests: 0, sees_lsi: false }, bus, irq }
 }
 
 /// The DMA requests of TIM3 that are modelled, as bits of DIER (UDE and CC2DE) and as lines to streams of DMA1 (RM0390
@@ -250,6 +250,11 @@ impl TimerPlace {
         self.kind.requests = requests;
         self
     }
+
+    const fn with_lsi(mut self) -> Self {
+        self.kind.sees_lsi = true;
+        self
+    }
 }
 
 /// TIM2 to TIM7, TIM9 to TIM14.
@@ -257,7 +262,7 @@ pub(crate) const TIMERS: [TimerPlace; 12] = [
     timer(true, 4, Apb::One, 28),
     timer(false, 4, Apb::One, 29).requests(TIM3_REQUESTS),
     timer(false, 4, Apb::One, 30),
-    timer(true, 4, Apb::One, 50),
+    timer(true, 4, Apb::One, 50).with_lsi(),
     timer(false, 0, Apb::One, 54),
     timer(false, 0, Apb::One, 55),
     timer(false, 2, Apb::Two, 24),

@@ -175,7 +175,9 @@ impl Rcc {
             // Every internal reset also drives NRST low.
             Some(cause) => self.reset_flags | 1 << cause as u32 | PINRSTF,
         };
+        let hse_start = self.sources[HSE].startup;
         *self = Self::new(self.variant, self.hse_hertz);
+        self.set_hse_start(hse_start);
         self.reset_flags = flags;
     }
 
@@ -233,6 +235,16 @@ impl Rcc {
             // tsu(LSI) of DS10693: 15 us typical, 40 us at most.
             self.lsi_ready = now + Time::from_micros(15);
         }
+    }
+
+    /// Whether the LSI runs.
+    pub(crate) fn lsi_runs(&self, now: Time) -> bool {
+        now >= self.lsi_ready
+    }
+
+    /// Sets the time that HSE takes to start, also after later resets.
+    pub(crate) fn set_hse_start(&mut self, time: Time) {
+        self.sources[HSE].startup = time;
     }
 
     pub(crate) fn read(&self, offset: u32, now: Time) -> Option<u32> {

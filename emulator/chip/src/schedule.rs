@@ -12,7 +12,7 @@ use crate::rcc::Cause;
 use crate::rules::Breach;
 use crate::spi::Far;
 use crate::stm32f4::Stm32f4;
-use crate::timer::Timer;
+use crate::timer::{LSI_CHANNEL, Timer};
 
 /// Indexes into `TIMERS` and `SPIS`.
 const TIM2: usize = 0;
@@ -131,12 +131,26 @@ impl Stm32f4 {
     }
 
     pub(crate) fn run_timer(&mut self, index: usize, now: Time) {
+        if TIMERS[index].kind.sees_lsi {
+            self.capture_lsi(index, now);
+        }
         let position = self.encoder_position(index, now);
         let before = self.timers[index].matches();
         self.timers[index].run(now, position);
         if index == TIM2 {
             self.lose_matches(before);
         }
+    }
+
+    /// Captures the last edge of the LSI. The edges are no events: a program sees them when it reads the timer.
+    fn capture_lsi(&mut self, index: usize, now: Time) {
+        let cycle = Time::of_cycle(self.board.lsi.into());
+        let edge = Time(now.0 - now.0 % cycle.0);
+        if edge > self.lsi_looked && self.timers[index].measures_lsi() && self.rcc.lsi_runs(edge) {
+            self.timers[index].run(edge, None);
+            self.timers[index].capture(LSI_CHANNEL, true);
+        }
+        self.lsi_looked = now;
     }
 
     /// Clears the match flags of TIM2 that a test makes the chip lose.
@@ -153,7 +167,7 @@ impl Stm32f4 {
     pub(crate) fn run_spi(&mut self, index: usize, now: Time) {
         let (wired, open) = (self.ssi_is_wired(index), Far::Nothing(self.open_input(index)));
         let plant = &self.plant;
-        self.spis[index].run(now, |at| plant.absolute(at).filter(|_| wired).map_or(open, Far::Position));
+        self.spis[index].run(now, |at| plant.absolute(at).filter(|_| wired).map_or(open, Far::Encoder));
         let place = &SPIS[index];
         if index == SPI2 && self.spis[index].asks_to_store() && self.losses.take(Loss::SpiByte) {
             self.spis[index].lose();

@@ -23,11 +23,15 @@ use crate::plant::Plant;
 use crate::pwr::Pwr;
 use crate::rcc::{Cause, Rcc};
 use crate::rules::Rules;
-use crate::spi::{Spi, Ssi};
+use crate::spi::{Spi, Ssi, SsiFormat};
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 use crate::unmodelled::{Record, Unmodelled};
 use crate::variant::Variant;
+
+/// The HCLK that a read of the flash allows for each wait state and one more, by the supply in volts.
+const PER_WAIT_STATE: [(f64, u64); 4] =
+    [(2.7, 30_000_000), (2.4, 24_000_000), (2.1, 22_000_000), (1.7, 20_000_000)];
 
 /// Ports GPIOA to GPIOI.
 pub(crate) const PORTS: usize = 9;
@@ -46,6 +50,8 @@ pub struct Stm32f4 {
     pub(crate) outside: [Outside; PORTS],
     /// The level of the encoder's index at the last check.
     pub(crate) index_level: bool,
+    /// The last look at the edges of the LSI for TIM5.
+    pub(crate) lsi_looked: Time,
     pub(crate) syscfg: Syscfg,
     pub(crate) exti: Exti,
     pub(crate) dbgmcu: Dbgmcu,
@@ -84,6 +90,7 @@ impl Stm32f4 {
             ports: std::array::from_fn(Gpio::new),
             outside: [Outside::default(); PORTS],
             index_level: false,
+            lsi_looked: Time::ZERO,
             syscfg: Syscfg::new(),
             exti: Exti::default(),
             dbgmcu: Dbgmcu::new(variant),
@@ -126,9 +133,32 @@ impl Stm32f4 {
         match loss {
             Loss::TransmitComplete => self.can.can1.transmitter.lost_ends += times,
             Loss::LeaveBus => self.can.can1.hold(),
+            Loss::LoopBack => self.can.can1.lose_loops(times),
             Loss::Abort => self.can.can1.transmitter.late_aborts += times,
             _ => self.losses.add(loss, times),
         }
+    }
+
+    /// The format of the absolute encoder's word.
+    pub fn ssi(&self) -> SsiFormat {
+        self.board.ssi
+    }
+
+    /// Connects an absolute encoder with another format at `now`.
+    pub fn set_ssi(&mut self, format: SsiFormat, now: Time) {
+        self.catch_up(now);
+        self.board.ssi = format;
+        self.spis.iter_mut().for_each(|spi| spi.set_format(format));
+    }
+
+    /// Sets the frequency of the LSI in hertz. The watchdog has it from the next reset on.
+    pub fn set_lsi(&mut self, hertz: u32) {
+        self.board.lsi = hertz;
+    }
+
+    /// Sets the time from switching HSE on to its first stable cycle.
+    pub fn set_hse_start(&mut self, time: Time) {
+        self.rcc.set_hse_start(time);
     }
 
     /// The clock tree that the program has set.
@@ -191,6 +221,14 @@ impl Stm32f4 {
     pub fn is_supplied(&self, now: Time, is_running: bool) -> bool {
         let hysteresis = if is_running { 0.0 } else { 0.1 };
         self.plant.supply(now) >= self.flash.reset_level() + hysteresis
+    }
+
+    /// Whether the core reads the flash too fast for its wait states and the supply (RM0390 table 5).
+    pub fn reads_flash_too_fast(&self, now: Time) -> bool {
+        let volts = self.plant.supply(now);
+        let level = PER_WAIT_STATE.into_iter().find(|(least, _)| volts >= *least);
+        let (_, hertz) = level.unwrap_or(PER_WAIT_STATE[PER_WAIT_STATE.len() - 1]);
+        self.clocks.hclk > hertz * u64::from(self.flash.wait_states() + 1)
     }
 
     pub(crate) fn backup_is_kept(&self, now: Time) -> bool {

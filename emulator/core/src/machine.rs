@@ -572,7 +572,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         let _ = self.cpu.reg_write(register, value.into());
     }
 
-    pub(crate) fn pc(&self) -> u32 {
+    /// The program counter.
+    pub fn pc(&self) -> u32 {
         self.register(RegisterARM::PC) & !1
     }
 }

@@ -9,6 +9,7 @@ use chip::{FLASH_BASE, Stm32f4};
 use emulator::{Incident, Machine, Model, Stop};
 use update::HEADER_LEN;
 
+use crate::bad_reads::BadReads;
 use crate::figures;
 use crate::image::Image;
 use crate::log::{Line, Log, Ram};
@@ -69,6 +70,7 @@ pub struct Board {
     locked_up: Option<u32>,
     /// Whether the supply was above the level of the chip's reset.
     is_supplied: bool,
+    bad_reads: BadReads,
 }
 
 impl Board {
@@ -112,6 +114,7 @@ impl Board {
             log: Log::default(),
             locked_up: None,
             is_supplied: true,
+            bad_reads: BadReads::default(),
         })
     }
 
@@ -148,8 +151,10 @@ impl Board {
     fn follow_supply(&mut self, limit: Time) -> Time {
         const LOOK: Time = Time::from_micros(100);
         let (now, chip) = (self.machine.now(), self.machine.peripherals());
-        let is_steady = matches!(chip.plant().supply_signal(), Signal::Constant(_));
         let is_supplied = chip.is_supplied(now, self.is_supplied);
+        let is_too_slow = is_supplied && chip.reads_flash_too_fast(now);
+        let is_steady = matches!(chip.plant().supply_signal(), Signal::Constant(_)) && !is_too_slow;
+        self.bad_reads.step(&mut self.machine, is_too_slow);
         if is_supplied != self.is_supplied {
             self.is_supplied = is_supplied;
             if is_supplied { self.machine.power_on(now) } else { self.machine.power_off() }
@@ -170,7 +175,7 @@ impl Board {
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
         // The board may have run a few instructions further, and the chip's time cannot go back.
         let now = now.max(self.machine.now());
-        stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
+        stimulus.act_on(self.machine.peripherals_mut(), now);
     }
 
     /// The current stimuli of the sensors.
@@ -186,6 +191,7 @@ impl Board {
             thermistor: knob(plant.thermistor_signal(), plant.thermistor(now)),
             supply: knob(plant.supply_signal(), plant.supply(now)),
             shaft: knob(plant.motion(), plant.revolutions(now)),
+            ssi: self.machine.peripherals().ssi().to_string(),
             buttons: plant.held(),
             faults: plant.faults(now).map(FaultKind::name).collect(),
         }
@@ -224,6 +230,11 @@ impl Board {
                 if (FLASH_BASE..HEADER_ADDRESS).contains(&pc) || pc >= RAM { images[1] } else { images[0] };
             ours.or(images[0])?.place(pc)
         })
+    }
+
+    /// Number of wrong reads of the flash, with a supply that is too low for the clock.
+    pub(crate) fn bad_reads(&self) -> u64 {
+        self.bad_reads.count()
     }
 
     /// How often the board was switched on.

@@ -107,6 +107,11 @@ pub struct Options {
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
     pub shaft: Vec<Targeted<Stimulus>>,
 
+    /// Format of the absolute encoder, e.g. 12+13,gray,error,even: bits of the turns and the steps, coding, error bit,
+    /// parity.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("ssi", text))]
+    pub ssi: Vec<Targeted<Stimulus>>,
+
     /// Press or release a button, e.g. 1:down.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("button", text))]
     pub button: Vec<Targeted<Stimulus>>,

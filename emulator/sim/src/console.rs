@@ -4,7 +4,7 @@ use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 
-use crate::stimuli::{Stimulus, Targeted};
+use crate::stimuli::{KINDS, Stimulus, Targeted};
 
 /// A command.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,8 +15,8 @@ pub enum Command {
     Quit,
 }
 
-/// The syntax of the commands.
-pub const HELP: &str = "commands: pressure|temperature|thermistor|supply|shaft|button|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
+/// The syntax of the commands; a test compares it with the kinds of stimuli.
+pub const HELP: &str = "commands: pressure|temperature|thermistor|supply|power|shaft|ssi|button|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
 
 /// Parses one line; `None` for an empty line.
 pub fn parse(line: &str) -> Option<Result<Command, String>> {
@@ -26,9 +26,7 @@ pub fn parse(line: &str) -> Option<Result<Command, String>> {
         "" => return None,
         "quit" if rest.is_empty() => Ok(Command::Quit),
         "help" => Err(HELP.to_owned()),
-        "pressure" | "temperature" | "thermistor" | "supply" | "shaft" | "button" | "fault" => {
-            Stimulus::parse(word, rest.trim()).map(Command::Stimulus)
-        }
+        kind if KINDS.contains(&kind) => Stimulus::parse(kind, rest.trim()).map(Command::Stimulus),
         _ => Err(format!("{word:?} is no command; {HELP}")),
     })
 }
@@ -53,6 +51,7 @@ mod tests {
 
     #[test]
     fn commands_and_what_is_none() {
+        assert!(HELP.contains(&KINDS.join("|")));
         assert_eq!(parse("  "), None);
         assert_eq!(parse(" quit "), Some(Ok(Command::Quit)));
         let Some(Ok(Command::Stimulus(stimulus))) = parse("pressure 1=const:300000") else { panic!() };

@@ -49,7 +49,7 @@ pub(crate) fn save_backup(dir: &Path, node: u8, bytes: Option<&[u8]>) -> Result<
 }
 
 fn read(path: &Path, size: usize) -> Result<Option<Vec<u8>>> {
-    let bytes = match input::read(path, size as u64) {
+    let bytes = match wire::input::read(path, size as u64) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
     };

@@ -27,7 +27,7 @@ impl Image {
     /// When the file cannot be read, or is no ELF file.
     pub fn load(path: &Path) -> Result<Image> {
         let name = path.display().to_string();
-        let elf = input::read(path, LARGEST).with_context(|| format!("cannot read {name}"))?;
+        let elf = wire::input::read(path, LARGEST).with_context(|| format!("cannot read {name}"))?;
         Image::parse(&name, elf).with_context(|| format!("{name} is not an image for the board"))
     }
 

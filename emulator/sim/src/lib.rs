@@ -25,6 +25,7 @@ pub mod summary;
 pub mod traffic;
 pub mod world;
 
+mod bad_reads;
 mod figures;
 mod greeting;
 mod keeper;

@@ -29,7 +29,7 @@ pub fn bits_per_second(kbit: u16) -> u32 {
 pub fn world(options: &Options) -> Result<World> {
     let firmware = Image::load(&options.firmware)?;
     let bootloader = options.bootloader.as_deref().map(Image::load).transpose()?;
-    let header = bootloader.is_some().then(|| sign::product::development_image(&firmware.elf));
+    let header = bootloader.is_some().then(|| programmer::sign::product::development_image(&firmware.elf));
     let header = header.transpose()?.map(|image| image.header.encode());
     let images = Rc::new(Images { firmware, header, bootloader });
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
@@ -45,8 +45,9 @@ pub fn world(options: &Options) -> Result<World> {
     }
     ensure!(all_are_for_a_node(&options.oscillator, options), "an oscillator is for nobody");
     ensure!(all_are_for_a_node(&options.lsi, options), "an LSI is for nobody");
-    let Options { pressure, temperature, thermistor, supply, shaft, button, fault, .. } = options;
-    let stimuli = [pressure, temperature, thermistor, supply, shaft, button, fault].into_iter().flatten();
+    let Options { pressure, temperature, thermistor, supply, shaft, ssi, button, fault, .. } = options;
+    let stimuli =
+        [pressure, temperature, thermistor, supply, shaft, ssi, button, fault].into_iter().flatten();
     for stimulus in stimuli {
         world.apply(stimulus).context("a stimulus is for nobody")?;
     }

@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use canbus::Time;
-use chip::plant::{BUTTONS, Fault, FaultSwitch, Motion, Plant, Push, Signal};
+use chip::plant::{Fault, FaultSwitch, Motion, Push, Signal};
+use chip::{BUTTONS, SsiFormat, Stm32f4};
 use serde::Serialize;
 
 use crate::cli::{BOARD_NUMBERS, board_number};
@@ -23,6 +24,8 @@ pub enum Stimulus {
     Supply(Signal),
     /// The position of the shaft in revolutions, or its speed.
     Shaft(Motion),
+    /// The format of the absolute encoder.
+    Ssi(SsiFormat),
     /// A button is pressed or released.
     Button(Push),
     /// A fault of the wiring or of a sensor, with its span of time.
@@ -32,7 +35,7 @@ pub enum Stimulus {
 }
 
 impl Stimulus {
-    /// Parses `[ID=]SPEC` of a kind: pressure, temperature, thermistor, supply, shaft, button or fault.
+    /// Parses `[ID=]SPEC` of one of the [`KINDS`].
     ///
     /// # Errors
     /// One line that describes the error.
@@ -42,21 +45,25 @@ impl Stimulus {
             "temperature" => in_kelvin(text).map(|spec| spec.map(Stimulus::Temperature)),
             "thermistor" => in_kelvin(text).map(|spec| spec.map(Stimulus::Thermistor)),
             "supply" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Supply)),
+            "power" => {
+                text.parse().map(|spec: Targeted<Power>| spec.map(|Power(signal)| Stimulus::Supply(signal)))
+            }
+            "ssi" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Ssi)),
             "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
             "button" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Button)),
             "fault" if text.ends_with(":on") || text.ends_with(":off") => {
                 text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Switch))
             }
             "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
-            _ => Err(format!(
-                "{kind:?} is no stimulus; there are pressure, temperature, thermistor, supply, shaft, button and fault"
-            )),
+            _ => Err(format!("{kind:?} is no stimulus; there are {}", KINDS.join(", "))),
         }
     }
 
     /// Applies the stimulus from `now` on.
-    pub(crate) fn act_on(&self, plant: &mut Plant, now: Time) {
+    pub(crate) fn act_on(&self, chip: &mut Stm32f4, now: Time) {
+        let plant = chip.plant_mut(now);
         match self.clone() {
+            Stimulus::Ssi(format) => chip.set_ssi(format, now),
             Stimulus::Pressure(signal) => plant.set_pressure(signal, now),
             Stimulus::Temperature(signal) => plant.set_temperature(signal, now),
             Stimulus::Thermistor(signal) => plant.set_thermistor(signal, now),
@@ -88,10 +95,38 @@ pub struct BoardStimuli {
     pub supply: Knob,
     /// The position of the shaft, in revolutions.
     pub shaft: Knob,
+    /// The format of the absolute encoder.
+    pub ssi: String,
     /// The buttons that are held down.
     pub buttons: [bool; BUTTONS],
     /// The names of the active faults.
     pub faults: Vec<&'static str>,
+}
+
+/// The kinds of stimuli.
+pub const KINDS: [&str; 9] =
+    ["pressure", "temperature", "thermistor", "supply", "power", "shaft", "ssi", "button", "fault"];
+
+/// The supply of the board is switched.
+struct Power(Signal);
+
+/// The supply that is on, in V.
+const ON: f64 = 3.3;
+
+impl FromStr for Power {
+    type Err = String;
+
+    /// `off`, `on`, or `off:SECONDS` for a cut of the supply.
+    fn from_str(text: &str) -> Result<Power, String> {
+        let seconds = |text: &str| text.parse().ok().filter(|at: &f64| at.is_finite() && *at > 0.0);
+        let signal = match text.split_once(':') {
+            None if text == "off" => Some(Signal::Constant(0.0)),
+            None if text == "on" => Some(Signal::Constant(ON)),
+            Some(("off", time)) => seconds(time).map(|at| Signal::Step { from: 0.0, to: ON, at }),
+            _ => None,
+        };
+        signal.map(Power).ok_or_else(|| format!("`{text}` is not off, on or off:SECONDS"))
+    }
 }
 
 /// A quantity with its setting.
@@ -171,6 +206,20 @@ mod tests {
             assert!(Stimulus::parse(kind, "const:298.15").is_ok());
         }
         assert!(Stimulus::parse("pressure", "const:25").is_ok());
+    }
+
+    #[test]
+    fn the_power_is_a_supply_without_a_ramp() {
+        let cut = Signal::Step { from: 0.0, to: 3.3, at: 0.5 };
+        for (text, signal) in
+            [("off", Signal::Constant(0.0)), ("on", Signal::Constant(3.3)), ("off:0.5", cut)]
+        {
+            let read = Stimulus::parse("power", text).unwrap();
+            assert_eq!(read.what, Stimulus::Supply(signal), "{text}");
+        }
+        for text in ["", "1", "off:", "off:0", "off:x", "on:1"] {
+            assert!(Stimulus::parse("power", text).is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -167,6 +167,11 @@ impl World {
         self.boards[index].machine()
     }
 
+    /// Number of wrong reads of the flash of a board, with a supply that is too low for the clock.
+    pub fn bad_reads(&self, index: usize) -> u64 {
+        self.boards.get(index).map_or(0, Board::bad_reads)
+    }
+
     /// The bus, for the injection of bit errors.
     pub fn bus(&mut self) -> &mut Bus {
         &mut self.bus

@@ -73,6 +73,7 @@ fn target() -> Target {
     let application = Area::new(1280, &[512, 512]);
     let layout = Layout::new(
         Area::new(0, &[1280]),
+        Area::new(5376, &[512]),
         application,
         Area::new(2304, &[512, 1024]),
         Area::new(3840, &[512, 1024]),

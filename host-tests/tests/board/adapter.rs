@@ -1,11 +1,11 @@
 //! The program `nodectl` on the bus of the emulated boards, in virtual time.
 
-use bringup_emulated::Adapter;
-pub(crate) use bringup_emulated::Shared;
 use nodectl::Network;
 use nodectl::bus::Bus;
 use nodectl::cli::{Cli, Failure, Output, Paper, Session};
 use sim::world::World;
+use workbench::bringup::Adapter;
+pub(crate) use workbench::bringup::Shared;
 
 /// Runs a command with its own adapter; returns its output and its result. `each` is called between two polls of the
 /// adapter.

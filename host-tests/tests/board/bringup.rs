@@ -4,9 +4,9 @@ use bringup::chip::Chip;
 use bringup::report::{Report, Result, StepReport};
 use bringup::run::{self, Effort, Subject};
 use bringup::steps;
-use bringup_emulated::faults::{self, Fault};
-use bringup_emulated::{EmulatedDesk, world};
 use canopen::NodeId;
+use workbench::bringup::faults::{self, Fault};
+use workbench::bringup::{EmulatedDesk, world};
 
 use crate::support::images;
 

@@ -1,7 +1,7 @@
 //! Memory budget of the application. The longest image has 127 KiB of code: the remaining space is a reserve for growth
 //! in the field.
 
-use budget::{Budget, Compiler};
+use callgraph::budget::{Budget, Compiler};
 
 use crate::support::{SECOND, images, world};
 

@@ -118,7 +118,10 @@ fn three_nodes_without_a_node_id_are_found_by_fastscan_and_keep_what_they_are_gi
     let mut serials = vec![];
     for id in [10, 20, 30] {
         let [vendor, product, _, serial] = fastscan(&mut world, &master).expect("one more");
-        assert_eq!((vendor, product), (product::VENDOR_ID, node::Personality::Pressure.product_code()));
+        assert_eq!(
+            (vendor, product),
+            (profiles::product::VENDOR_ID, node::Personality::Pressure.product_code())
+        );
         serials.push(serial);
         assert_eq!(master.lss(&mut world, &[0x11, id, 0, 0, 0, 0, 0, 0]), [[0x11, 0, 0, 0, 0, 0, 0, 0]]);
         assert_eq!(master.lss(&mut world, &[0x17, 0, 0, 0, 0, 0, 0, 0]), [[0x17, 0, 0, 0, 0, 0, 0, 0]]);

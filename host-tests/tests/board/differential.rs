@@ -41,7 +41,7 @@ fn is_comparable(row: &Object) -> bool {
     let is_own =
         matches!(row.index, 0x1008..=0x100A | 0x1F56 | 0x2010 | 0x2F00) || row.access == Access::WriteOnly;
     let is_stored = matches!(
-        row.rule,
+        row.rule(),
         Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting | Rule::ProgramControl
     );
     !is_measured && !is_own && !is_stored

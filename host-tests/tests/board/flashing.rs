@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
-use flash::Content;
-use sign::key;
+use programmer::flash::Content;
+use programmer::sign::key;
 
 use crate::support::{firmware, images, world};
 

@@ -1,6 +1,6 @@
 //! The images for the other chips, each on a board with that chip: clocks, sectors, missing peripherals.
 
-use sign::product;
+use programmer::sign::product;
 use sim::world::World;
 
 use crate::scenario::{Node, observe};

@@ -1,6 +1,8 @@
 //! Properties of the chips that a model of registers alone would not show: pins, errata, a late clock, memory that
 //! decays. docs/evidence.md, Silicon, has the list.
 
+use std::path::Path;
+
 use canbus::Time;
 use chip::Loss;
 use object::{Object, ObjectSection, ObjectSymbol};
@@ -189,4 +191,32 @@ fn the_log_of_the_application_survives_the_bootloader() {
     // The retained words at the end of RAM belong to both.
     let end = end.filter(|end| (0x2000_0000..0x2001_FF00).contains(end)).max().unwrap();
     assert!(block >= end, "the log at {block:#x}, the bootloader up to {end:#x}");
+}
+
+/// The table of the documents has every item of the examination, each with a test that exists, a rule, a bring-up step, or
+/// the first board.
+#[test]
+fn the_table_of_the_documents_is_complete() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let evidence = std::fs::read_to_string(root.join("../docs/evidence.md")).unwrap();
+    let rows = evidence
+        .lines()
+        .skip_while(|line| *line != "## Silicon")
+        .take_while(|line| *line != "## Lost events");
+    let rows: Vec<&str> = rows.filter(|line| line.starts_with("| H")).collect();
+    for number in 21..=33 {
+        assert!(rows.iter().any(|row| row.contains(&format!("H{number}"))), "H{number} is not in the table");
+    }
+    let tests: String = std::fs::read_dir(root.join("tests/board"))
+        .unwrap()
+        .filter_map(|file| std::fs::read_to_string(file.unwrap().path()).ok())
+        .collect();
+    for row in rows {
+        let last = row.trim_end_matches(" |").rsplit(" | ").next().unwrap();
+        let places = ["`", "rule", "bring-up", "first board"];
+        assert!(places.iter().any(|place| last.contains(place)), "{row}");
+        for name in last.split('`').skip(1).step_by(2).filter(|name| !name.contains([':', '/', '.'])) {
+            assert!(tests.contains(&format!("fn {name}(")), "{name} is no test: {row}");
+        }
+    }
 }

@@ -12,7 +12,7 @@ use host_tests::network::{Network, from_bus};
 use host_tests::sdo::Client;
 use host_tests::station::PressureNode;
 use node::{Measurement, Personality, Protocol, StoreJob};
-use product::{REVISION, VENDOR_ID};
+use profiles::product::{REVISION, VENDOR_ID};
 
 const NODES: u8 = 127;
 /// Event timer of TPDO 1, in ms: 127 frames of eight bytes take some 16 ms.

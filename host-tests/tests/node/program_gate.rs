@@ -6,7 +6,7 @@ use canopen::sdo::Multiplexer;
 use host_tests::bench::{Bench, ID, raw};
 use host_tests::sdo::{Client, Failure};
 use node::{Instant, Personality, Verdict};
-use update::{Authorisation, Pair, Trial, response};
+use update::{Authorisation, Cause, Pair, Trial, response};
 
 const KEY: [u8; 32] = [0x5A; 32];
 const SERIAL: u32 = 0x1234_5678;
@@ -124,7 +124,7 @@ fn a_stranger_neither_confirms_a_program_nor_takes_it_back() {
         }
         assert_eq!(bench.read(0x2002, 1), Ok(vec![1]), "node {ID}, {personality:?}: it is on trial");
         assert_eq!(verdict(&mut bench, 599), None, "{personality:?}");
-        assert_eq!(verdict(&mut bench, 600), Some(Verdict::TakeBack), "{personality:?}");
+        assert_eq!(verdict(&mut bench, 600), Some(Verdict::TakeBack(Cause::Time)), "{personality:?}");
     }
 }
 
@@ -136,5 +136,5 @@ fn a_program_is_confirmed_after_ten_seconds_when_the_holder_of_the_key_has_spoke
     open(&mut bench);
     assert_eq!(verdict(&mut bench, 20), None, "the challenge was not answered before");
     bench.read(0x1000, 0).unwrap();
-    assert_eq!(verdict(&mut bench, 20), Some(Verdict::Confirm));
+    assert_eq!(verdict(&mut bench, 20), Some(Verdict::Confirm(Cause::Master)));
 }

@@ -5,7 +5,7 @@ use host_tests::bench::Bench;
 use node::fault::PROGRAM_TAKEN_BACK;
 use node::{Instant, Verdict};
 use profiles::Personality;
-use update::{Programs, Reason, Trial};
+use update::{Cause, Event, Log, Outcome, Programs, Reason, Trial, Version};
 
 const STATE: u8 = 1;
 const COMMAND: u8 = 2;
@@ -61,13 +61,39 @@ fn left_alone(limit: u16, automatic: u16) -> Bench {
 fn the_programs_in_the_flash_are_read_by_an_object_of_every_personality() {
     for personality in Personality::ALL {
         let mut bench = Bench::booted_as(personality);
-        let programs = Programs { counter: 7, generation: 0x28, staged: 0x0102_0304, kept: 0x0506_0708 };
+        let programs = Programs {
+            counter: 7,
+            generation: 0x28,
+            staged: 0x0102_0304,
+            kept: 0x0506_0708,
+            erases: 0x0A0B,
+            clears_allowed: 49,
+        };
         bench.protocol.set_programs(programs);
         bench.restart();
         let mut read = |sub| bench.read(0x2004, sub).unwrap();
         assert_eq!((read(2), read(3)), (vec![7, 0, 0, 0], vec![0x28]), "{personality:?}");
         assert_eq!((read(4), read(5)), (vec![4, 3, 2, 1], vec![8, 7, 6, 5]), "{personality:?}");
+        assert_eq!((read(6), read(7)), (vec![0x0B, 0x0A], vec![49]), "{personality:?}");
         assert!(bench.write(0x2004, 2, &[0; 4]).is_err());
+    }
+}
+
+#[test]
+fn the_log_of_updates_is_read_by_an_object_of_every_personality() {
+    for personality in Personality::ALL {
+        let mut bench = Bench::booted_as(personality);
+        assert_eq!(bench.read(0x2006, 0), Ok(vec![0; Log::LEN]), "{personality:?}: no event");
+        let version = Version { major: 1, minor: 2, patch: 3 };
+        let mut log = Log::EMPTY;
+        for outcome in [Outcome::OnTrial, Outcome::Confirmed(Cause::Command)] {
+            log.add(&Event { outcome, version, generation: 16 });
+        }
+        bench.protocol.set_update_log(log);
+        bench.restart();
+        let read = bench.read(0x2006, 0).unwrap();
+        assert_eq!(read[..16], [3, 1, 0, 0, 1, 2, 3, 16, 1, 0, 0, 0, 1, 2, 3, 16], "{personality:?}");
+        assert!(bench.write(0x2006, 0, &[0; 8]).is_err());
     }
 }
 
@@ -88,7 +114,7 @@ fn a_program_is_confirmed_ten_seconds_after_its_start_when_a_master_has_spoken()
         assert_eq!(verdict(&mut bench, 599.0), None, "nobody has spoken");
         speak(&mut bench);
         assert_eq!(verdict(&mut bench, 9.9), None, "{who}");
-        assert_eq!(verdict(&mut bench, 10.0), Some(Verdict::Confirm), "{who}");
+        assert_eq!(verdict(&mut bench, 10.0), Some(Verdict::Confirm(Cause::Master)), "{who}");
         bench.protocol.end_trial();
         assert_eq!((verdict(&mut bench, 20.0), state(&mut bench)), (None, 0));
     }
@@ -113,18 +139,18 @@ fn off_the_bus_and_without_a_measurement_nothing_is_confirmed() {
     bench.read(0x1000, 0).unwrap();
     assert_eq!(verdict(&mut bench, 11.0), None, "nothing was measured");
     assert_eq!(bench.write(0x2002, COMMAND, b"conf"), DEVICE_STATE);
-    assert_eq!(verdict(&mut bench, 600.0), Some(Verdict::TakeBack));
+    assert_eq!(verdict(&mut bench, 600.0), Some(Verdict::TakeBack(Cause::Time)));
 }
 
 #[test]
 fn without_a_master_the_program_before_comes_back_in_time_or_the_new_one_is_confirmed_by_itself() {
     for (limit, automatic, seconds, then) in [
         (600, 0, 599.9, None),
-        (600, 0, 600.0, Some(Verdict::TakeBack)),
+        (600, 0, 600.0, Some(Verdict::TakeBack(Cause::Time))),
         (0, 0, 60_000.0, None),
         (600, 5, 4.9, None),
-        (600, 5, 5.0, Some(Verdict::Confirm)),
-        (5, 10, 5.0, Some(Verdict::TakeBack)),
+        (600, 5, 5.0, Some(Verdict::Confirm(Cause::Time))),
+        (5, 10, 5.0, Some(Verdict::TakeBack(Cause::Time))),
     ] {
         let mut bench = left_alone(limit, automatic);
         assert_eq!(verdict(&mut bench, seconds), then, "{limit} s, {automatic} s, after {seconds} s");
@@ -133,7 +159,7 @@ fn without_a_master_the_program_before_comes_back_in_time_or_the_new_one_is_conf
 
 #[test]
 fn a_master_ends_the_trial_by_command_and_gets_its_answer_first() {
-    for (word, then) in [(b"conf", Verdict::Confirm), (b"back", Verdict::TakeBack)] {
+    for (word, then) in [(b"conf", Verdict::Confirm(Cause::Command)), (b"back", Verdict::TakeBack(Cause::Command))] {
         let mut bench = on_trial();
         assert_eq!(state(&mut bench), 1);
         bench.write(0x2002, COMMAND, word).unwrap();

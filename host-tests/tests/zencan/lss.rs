@@ -5,7 +5,7 @@ use host_tests::station::PressureNode;
 use host_tests::watch::expects;
 use monitor::Rule;
 use node::Personality;
-use product::{REVISION, VENDOR_ID};
+use profiles::product::{REVISION, VENDOR_ID};
 use tokio::time::{Duration, sleep};
 use zencan_client::common::NodeId;
 use zencan_client::common::lss::{LssIdentity, LssState};

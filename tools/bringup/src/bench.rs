@@ -10,8 +10,25 @@ use nodectl::sdo;
 use crate::chip::Chip;
 use crate::desk::{Action, Desk};
 use crate::report::{Check, Result as Outcome};
-use crate::run::Effort;
 use crate::values;
+
+/// How long the steps measure.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Seconds of measurements over time.
+    pub seconds: u64,
+    /// Frames at each bit rate.
+    pub frames: u32,
+    /// Repetitions of whatever has to work each time.
+    pub times: u32,
+}
+
+impl Effort {
+    /// That of a real board.
+    pub const FULL: Effort = Effort { seconds: 60, frames: 10_000, times: 20 };
+    /// A first look.
+    pub const SHORT: Effort = Effort { seconds: 5, frames: 60, times: 3 };
+}
 
 /// The object with the values of the board.
 pub(crate) const SELF_TEST: u16 = 0x2005;
@@ -152,6 +169,20 @@ impl Bench<'_> {
     pub fn self_test(&mut self, number: u8) -> Result<u32> {
         self.set(SELF_TEST, 0, &values::selection(number))?;
         self.object(SELF_TEST, 0)
+    }
+
+    /// A value of the board in 2005h that only development images have; otherwise `None`, with a remark.
+    ///
+    /// # Errors
+    /// The node does not answer.
+    pub fn start_test(&mut self, what: &str, number: u8) -> Result<Option<u32>> {
+        let value = self.self_test(number)?;
+        // The clock of a development image takes some time to start.
+        let is_tested = self.self_test(values::CLOCK_WAIT)? != 0;
+        if !is_tested {
+            self.remark(what, "not tested", "a value", "Flash development images for this check");
+        }
+        Ok(is_tested.then_some(value))
     }
 
     fn client(&mut self) -> sdo::Client<'_> {

@@ -4,9 +4,9 @@ use std::fmt;
 
 use anyhow::Result;
 use canopen::Duration;
-use flash::Part;
 use nodectl::Network;
 use nodectl::update::Image;
+use programmer::flash::Part;
 
 /// A board on a desk.
 pub trait Desk {

@@ -1,7 +1,7 @@
 //! `cargo xtask bringup`: the first hour of a board, in fifteen steps that stop at the first failure.
 //!
 //! [`steps`] has the steps. Each one uses a [`Desk`]: a debug probe, a CAN adapter, and the hands of the user. [`real`] is
-//! the desk with a board; the emulated one is in `emulator/desk`. [`report`] keeps what was seen, so that a run can be
+//! the desk with a board; the emulated one is in `emulator/workbench`. [`report`] keeps what was seen, so that a run can be
 //! continued.
 #![forbid(unsafe_code)]
 

@@ -11,11 +11,11 @@ use bringup::run::{Effort, Subject};
 use bringup::steps::{self, Step};
 use canopen::NodeId;
 use clap::Parser;
-use flash::Content;
 use nodectl::Network;
 use nodectl::bus::Address;
 use nodectl::update::Image;
-use probe::Board;
+use programmer::flash::Content;
+use programmer::probe::Board;
 
 /// Takes a board with the images of `cargo xtask flash` through fifteen steps, and writes a report.
 ///
@@ -72,7 +72,7 @@ fn run(cli: &Cli) -> Result<report::Result> {
     let chip =
         Chip::named(&cli.board.chip).with_context(|| format!("no images exist for {}", cli.board.chip))?;
     let mut report = if cli.again { Report::default() } else { Report::read(&cli.report)? };
-    probe::check_version().map_err(anyhow::Error::msg)?;
+    programmer::probe::check_version().map_err(anyhow::Error::msg)?;
     let mut desk = desk(cli)?;
     let subject = Subject { node: cli.node, chip, kbit: cli.bit_rate };
     let effort = if cli.short { Effort::SHORT } else { Effort::FULL };
@@ -95,7 +95,7 @@ fn run(cli: &Cli) -> Result<report::Result> {
 fn desk(cli: &Cli) -> Result<RealDesk> {
     let read =
         |path: &PathBuf| std::fs::read(path).with_context(|| format!("cannot read {}", path.display()));
-    let key = sign::key::development();
+    let key = programmer::sign::key::development();
     let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key, Vec::new())?;
     let (address, bit_rate) = (cli.bus.clone(), cli.bit_rate);
     let network = Network::open(move || address.open(bit_rate))?;

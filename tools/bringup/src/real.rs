@@ -6,11 +6,11 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use canopen::Duration;
-use flash::Part;
 use nodectl::Network;
 use nodectl::bus::Address;
 use nodectl::update::Image;
-use probe::{Board, line};
+use programmer::flash::Part;
+use programmer::probe::{Board, line};
 
 use crate::desk::{Action, Desk};
 

@@ -8,23 +8,7 @@ use crate::desk::Desk;
 use crate::report::{Check, Report, Result, StepReport};
 use crate::steps::Step;
 
-/// How long the steps measure.
-#[derive(Clone, Copy, Debug)]
-pub struct Effort {
-    /// Seconds of measurements over time.
-    pub seconds: u64,
-    /// Frames at each bit rate.
-    pub frames: u32,
-    /// Repetitions of whatever has to work each time.
-    pub times: u32,
-}
-
-impl Effort {
-    /// The bus of a real board.
-    pub const FULL: Effort = Effort { seconds: 60, frames: 10_000, times: 20 };
-    /// A first look.
-    pub const SHORT: Effort = Effort { seconds: 5, frames: 60, times: 3 };
-}
+pub use crate::bench::Effort;
 
 /// The board of a run.
 #[derive(Clone, Copy, Debug)]

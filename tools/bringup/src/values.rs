@@ -30,6 +30,24 @@ pub const SSI_WORD: u8 = 23;
 /// The conversions of two milliseconds, two in a word.
 pub const CONVERSIONS: u8 = 25;
 
+/// The frequency of the LSI in hertz, as TIM5 has measured it at the start; 0 in a release, as with the next ones.
+pub const LSI: u8 = 105;
+/// The result of the test in loop-back at the start.
+pub const LOOP_BACK: u8 = 106;
+/// The time from the start of the program to the clock of the PLL in microseconds.
+pub const CLOCK_WAIT: u8 = 107;
+/// Bytes of the stack that were never used.
+pub const FREE_STACK: u8 = 108;
+
+/// The results of the test in loop-back, from 1 on.
+pub const LOOP_BACK_RESULTS: [&str; 5] = [
+    "received as sent",
+    "initialisation does not end, or not begin",
+    "not sent",
+    "not received",
+    "another frame received",
+];
+
 /// The commands of a development image, with the words of the log after the reset.
 pub const COMMANDS: [(u8, &str, &str); 4] = [
     (0xF0, "hang", "reset by independent watchdog"),

@@ -5,6 +5,7 @@
 //! register. A call through memory is refused, as is recursion, so that the graph is never incomplete without notice.
 #![forbid(unsafe_code)]
 
+pub mod budget;
 mod code;
 mod errata;
 mod graph;
@@ -16,8 +17,8 @@ mod tasks;
 
 use std::path::Path;
 
+use crate::budget::Compiler;
 use anyhow::{Context, Result};
-use budget::Compiler;
 
 pub use stack::{Bound, Level};
 

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
+use crate::budget::Compiler;
 use addr2line::Loader;
 use anyhow::{Result, anyhow, ensure};
-use budget::Compiler;
 
 use crate::graph::Graph;
 use crate::image::Image;

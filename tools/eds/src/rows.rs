@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use canopen::dictionary::{Access as RowAccess, DefaultValue, Mapping, Object as Row};
-use product::{REVISION, VENDOR_ID};
+use profiles::product::{REVISION, VENDOR_ID};
 
 use crate::read::BIT_RATES;
 use crate::{Access, DataType, Device, DeviceInfo, Eds, Entry, Flags, Formula, Object, ObjectType, Value};

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Write};
 
-use product::REVISION;
+use profiles::product::REVISION;
 
 use crate::read::BIT_RATES;
 use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, ObjectType, Reals};

@@ -2,8 +2,8 @@
 
 use canopen::NodeId;
 use eds::{Access, DEVICES, Edition, Eds, Flags, Formula, ObjectType, Value};
-use product::{REVISION, VENDOR_ID};
 use profiles::Personality;
+use profiles::product::{REVISION, VENDOR_ID};
 
 fn pressure() -> Eds {
     Eds::parse(&DEVICES[0].sheet(&Edition::default())).unwrap()

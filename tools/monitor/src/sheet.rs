@@ -62,7 +62,7 @@ pub struct Sheet {
 /// The sheet of a dictionary made with crate `canopen`.
 impl From<&[Object]> for Sheet {
     fn from(rows: &[Object]) -> Sheet {
-        let is_timer = |row: &&Object| matches!(row.rule, Rule::EventTimerOf(_));
+        let is_timer = |row: &&Object| matches!(row.rule(), Rule::EventTimerOf(_));
         Sheet {
             entries: rows.iter().map(|row| ((row.index, row.sub), Entry::of(row))).collect(),
             changes_pdos: rows.iter().filter(is_timer).map(|row| row.index).collect(),
@@ -75,10 +75,10 @@ impl From<&[Object]> for Sheet {
 impl Entry {
     fn of(row: &Object) -> Entry {
         let is_value = row.access == Access::ReadWrite && row.kind != Type::Domain;
-        let is_list = matches!(row.rule, Rule::ErrorCount | Rule::ScannerLine);
+        let is_list = matches!(row.rule(), Rule::ErrorCount | Rule::ScannerLine);
         let kind = match row.mapping {
             Mapping::Rpdo | Mapping::Both if is_value => Kind::Received,
-            _ if is_value && row.group.is_some() && !row.rule.is_command() && !is_list => Kind::Parameter,
+            _ if is_value && row.group.is_some() && !row.rule().is_command() && !is_list => Kind::Parameter,
             _ => Kind::Volatile,
         };
         let group = match row.group {

@@ -206,7 +206,8 @@ mod tests {
 
     #[test]
     fn the_devices_of_the_project_are_known() {
-        let pressure = Catalogue::built_in(product::VENDOR_ID, 1).expect("the pressure transmitter");
+        let pressure =
+            Catalogue::built_in(profiles::product::VENDOR_ID, 1).expect("the pressure transmitter");
         assert_eq!(pressure.find("Pressure process value"), Ok(at(0x6130, 1)));
         assert_eq!(pressure.data_type(at(0x6130, 1)), Some(DataType(0x08)));
         assert!(Catalogue::built_in(0xFFFF_FFFF, 1).is_none());

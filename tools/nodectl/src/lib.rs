@@ -31,6 +31,7 @@ mod network;
 pub mod nmt;
 pub mod object;
 mod other_clients;
+pub mod page;
 mod pdo_parameters;
 pub mod quantity;
 pub mod rules;

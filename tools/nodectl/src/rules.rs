@@ -38,7 +38,7 @@ impl Device {
         if let Some(own) = own {
             return Ok(Sheet::of_node(own.rows));
         }
-        let bytes = input::read(self.name.as_ref(), 4 << 20).map_err(|error| error.to_string())?;
+        let bytes = wire::input::read(self.name.as_ref(), 4 << 20).map_err(|error| error.to_string())?;
         let sheet = Eds::from_bytes(&bytes).map_err(|error| error.to_string())?;
         Ok(of_data_sheet(&sheet, self.node))
     }

@@ -7,6 +7,7 @@
 #![warn(clippy::pedantic)]
 
 mod digits;
+pub mod input;
 pub mod slcan;
 pub mod socketcand;
 pub mod stamp;

@@ -12,7 +12,8 @@ use anyhow::{Result, anyhow};
 
 use start::{Need, Package, runs};
 
-use super::{cpu_library, libclang, packages_in, python, system};
+use super::{cpu_library, libclang, packages_in, python};
+use crate::apt;
 use crate::command::{cargo, target_dir};
 
 /// A cargo call that can build the emulator.
@@ -51,7 +52,7 @@ fn make() -> Result<Vec<(OsString, OsString)>> {
     if let Some(found) = find() {
         return Ok(found);
     }
-    system::install(&from_package_manager())?;
+    apt::install(&from_package_manager())?;
     find().ok_or_else(|| anyhow!("cmake or libclang does not work here, although it is installed; LIBCLANG_PATH can name the directory of another libclang"))
 }
 

@@ -9,9 +9,7 @@ mod cpu_library;
 pub(crate) mod emulator;
 mod libclang;
 pub(crate) mod python;
-pub(crate) mod system;
-
-use std::path::{Path, PathBuf};
+pub(crate) use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use start::Package;
@@ -19,7 +17,7 @@ use start::Package;
 pub(crate) use libclang::probe;
 pub(crate) use start::needs::{FLASH, IMAGES, Need, PICTURES, SIM, TEST, THOROUGH};
 
-use crate::target;
+use crate::{apt, target};
 
 /// Fails with the one command that installs the missing packages, if this user cannot install them.
 pub(crate) fn check(needs: &[Need]) -> Result<()> {
@@ -38,7 +36,7 @@ fn missing(needs: &[Need]) -> Vec<Package> {
 
 /// Installs the missing packages with the package manager.
 pub(crate) fn install(needs: &[Need]) -> Result<()> {
-    system::install(&missing(needs))
+    apt::install(&missing(needs))
 }
 
 /// `cargo xtask setup`: installs everything that the test command needs, or only prints what is missing.

@@ -7,12 +7,12 @@ use anyhow::{Context, Result};
 
 use start::python::missing;
 
-use super::system;
+use crate::apt;
 use crate::command::{root, run, target_dir};
 
 /// The Python interpreter with the CANopen clients that test the node.
 pub(crate) fn clients() -> Result<PathBuf> {
-    system::install(&missing())?;
+    apt::install(&missing())?;
     ensure(&target_dir().join("venv"), "host-tests/python/requirements.txt")
 }
 

@@ -23,6 +23,12 @@ struct Keeper(Domain);
 
 impl Application for Keeper {
     const CONDITIONS: &'static [Condition] = &[Condition::new(0x1000)];
+    const SENDS_EVENTS: bool = true;
+
+    fn sends_events(&self, _: u16) -> bool {
+        // The optimiser must not know that no TPDO sends events.
+        black_box(false)
+    }
 
     fn stored(&self, _: Group) -> Stored<'_> {
         // The optimiser must not know that nothing is ever stored: reading it belongs to the size.

@@ -9,6 +9,8 @@ pub(super) const BOARD: Board = Board {
     oscillator: Oscillator { hertz: 8_000_000, is_bypassed: false },
     // D2, between the supply and the pin.
     led: Light { pin: Pin::new('A', 6), on: false },
+    // PB0 selects a flash chip on this board.
+    indicators: [Light { pin: Pin::new('E', 5), on: true }, Light { pin: Pin::new('E', 6), on: true }],
     buttons: [
         // K0 and K1, to ground.
         Button { pin: Pin::new('E', 4), pull: Pull::Up, pressed: false },

@@ -38,6 +38,8 @@ pub struct Board {
     pub oscillator: Oscillator,
     /// The status LED.
     pub led: Light,
+    /// The indicators of CiA 303-3: RUN, green, and ERROR, red. The boards have none: they are LEDs of one's own.
+    pub indicators: [Light; 2],
     /// The buttons of a lift's panel.
     pub buttons: [Button; 2],
     /// The lamps of a lift's panel.
@@ -119,9 +121,11 @@ impl Board {
     pub const fn pins(&self, port: char) -> u16 {
         let [first, second] = self.buttons;
         let [left, right] = self.lamps;
+        let [run, error] = self.indicators;
         let own = self.led.pin.bit(port) | first.pin.bit(port) | second.pin.bit(port);
         let lamps = left.pin.bit(port) | right.pin.bit(port);
-        own | lamps | self.standby.pin.bit(port) | fixed(port)
+        let indicators = run.pin.bit(port) | error.pin.bit(port);
+        own | lamps | indicators | self.standby.pin.bit(port) | fixed(port)
     }
 }
 
@@ -159,10 +163,11 @@ mod tests {
     #[test]
     fn every_pin_of_a_board_has_one_function() {
         for (feature, board) in ALL {
-            let lights = [board.led, board.lamps[0], board.lamps[1], board.standby].map(|light| light.pin);
+            let lights = [[board.led, board.standby], board.lamps, board.indicators];
+            let lights = lights.into_iter().flatten().map(|light| light.pin);
             let buttons = board.buttons.map(|button| button.pin);
-            let mut taken = [None; 6];
-            for (place, pin) in lights.into_iter().chain(buttons).enumerate() {
+            let mut taken = [None; 8];
+            for (place, pin) in lights.chain(buttons).enumerate() {
                 assert!(('A'..='H').contains(&pin.port) && pin.number < 16, "{feature}: {pin:?}");
                 assert_eq!(
                     pin.bit(pin.port) & fixed(pin.port),
@@ -174,7 +179,7 @@ mod tests {
             }
             let of_ports: u32 = ('A'..='H').map(|port| board.pins(port).count_ones()).sum();
             let of_all: u32 = ('A'..='H').map(|port| fixed(port).count_ones()).sum();
-            assert_eq!(of_ports, of_all + 6, "{feature}");
+            assert_eq!(of_ports, of_all + 8, "{feature}");
         }
     }
 

@@ -8,6 +8,7 @@ pub(super) const BOARD: Board = Board {
     oscillator: Oscillator { hertz: 8_000_000, is_bypassed: true },
     // LD2.
     led: Light { pin: Pin::new('A', 5), on: true },
+    indicators: [Light { pin: Pin::new('B', 0), on: true }, Light { pin: Pin::new('B', 1), on: true }],
     buttons: [
         // B1, with a resistor to the supply.
         Button { pin: Pin::new('C', 13), pull: Pull::None, pressed: false },

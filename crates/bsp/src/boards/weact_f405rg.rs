@@ -8,6 +8,7 @@ pub(super) const BOARD: Board = Board {
     chip: Chip::F405,
     oscillator: Oscillator { hertz: 8_000_000, is_bypassed: false },
     led: Light { pin: Pin::new('B', 2), on: true },
+    indicators: [Light { pin: Pin::new('B', 0), on: true }, Light { pin: Pin::new('B', 1), on: true }],
     buttons: [
         // KEY, to the supply.
         Button { pin: Pin::new('C', 13), pull: Pull::Down, pressed: true },

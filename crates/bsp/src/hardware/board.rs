@@ -11,8 +11,8 @@ use super::can::Controller;
 use super::digital::{Buttons, Lamps};
 use super::flash::Flash;
 use super::front_end::FrontEnd;
-use super::led::Led;
-use super::self_test::SEEN;
+use super::led::{Indicators, Led};
+use super::self_test::{self, SEEN};
 use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
@@ -52,22 +52,28 @@ pub struct Board {
     pub lamps: Lamps,
     /// The status LED.
     pub led: Led,
+    /// The indicators of CiA 303-3.
+    pub indicators: Indicators,
 }
 
 impl Board {
     /// Starts everything but the bus and the sampling. The watchdog comes first, so that whatever hangs ends in a reset. Later losses of hardware events are counted in `losses`.
     #[must_use]
     pub fn start(device: Peripherals, losses: &'static Losses) -> Board {
+        self_test::begin();
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
         errata::keep_debugger(&device.DBGMCU, retained::is_development());
         clock_tree::raise(&device.RCC, &device.FLASH);
+        self_test::note_clock();
         let reset_cause = reset_cause(&device.RCC);
         let mut rcc = device.RCC.constrain();
+        self_test::note_lsi(&mut rcc);
         let (time, alarms) = time_base::start(device.TIM2, &mut rcc);
         let gpioa = device.GPIOA.split(&mut rcc);
         let gpiob = device.GPIOB.split(&mut rcc);
         let gpioc = device.GPIOC.split(&mut rcc);
-        let (can, transmitter) = Controller::new(device.CAN1, losses, &mut rcc);
+        let (mut can, transmitter) = Controller::new(device.CAN1, losses, &mut rcc);
+        self_test::note_loop_back(&mut can);
         let analogue = sampling::Parts {
             adc: device.ADC1,
             common: device.ADC_COMMON,
@@ -97,6 +103,7 @@ impl Board {
         let ssi = Ssi::new(absolute, losses, &mut rcc);
         let (backup, backup_state) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
         let (buttons, lamps, led) = (Buttons::new(&rcc), Lamps::new(&rcc), Led::new(&rcc));
+        let indicators = Indicators::new(&rcc);
         idle_pins::make_analogue(&rcc);
         let parameters = ParameterFlash::new(Flash::new(device.FLASH), losses);
         Board {
@@ -114,6 +121,7 @@ impl Board {
             buttons,
             lamps,
             led,
+            indicators,
         }
     }
 }

@@ -193,7 +193,7 @@ fn make_pins(rcc: &RCC) {
 }
 
 /// Requests initialisation, and waits until the controller acknowledges it and has left sleep.
-fn is_initialising() -> bool {
+pub(super) fn is_initialising() -> bool {
     registers().mcr().modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
     let latest = Clock::now() + LONGEST_FRAME;
     loop {

@@ -106,7 +106,7 @@ fn own_crc() -> u32 {
     // SAFETY: the linker has placed the program there: flash, always readable, and not programmed while the program
     // runs.
     let program = unsafe { core::slice::from_raw_parts(start as *const u8, len) };
-    checksum::of(program)
+    storage::checksum::of(program)
 }
 
 /// Size of each of the two pages: one sector (memory.x).

@@ -26,6 +26,8 @@ pub mod retained;
 mod sampling;
 pub mod self_test;
 mod ssi;
+#[cfg(feature = "development")]
+mod start_tests;
 mod stream;
 mod time_base;
 mod transmit;

@@ -78,21 +78,11 @@ impl Receiver {
     /// Reads the oldest frame and releases its place. A place that is not released is counted, and its frame is read again
     /// by the next interrupt; a FIFO that never releases one ends in a reset by the watchdog.
     fn release(&mut self) -> Option<Mailbox> {
-        let output = registers().rx(self.fifo as usize);
-        let mailbox = Mailbox {
-            rir: output.rir().read().bits(),
-            rdtr: output.rdtr().read().bits(),
-            rdlr: output.rdlr().read().bits(),
-            rdhr: output.rdhr().read().bits(),
-        };
-        registers().rfr(self.fifo as usize).write(|w| w.rfom().set_bit());
-        // The next frame is at the output once the hardware has cleared the request, a few clocks later.
-        let is_released =
-            (0..RELEASE_POLLS).any(|_| registers().rfr(self.fifo as usize).read().rfom().bit_is_clear());
-        if !is_released {
+        let oldest = take(self.fifo);
+        if oldest.is_none() {
             self.count(true);
         }
-        is_released.then_some(mailbox)
+        oldest
     }
 
     fn count(&self, lost: bool) {
@@ -100,4 +90,20 @@ impl Receiver {
             self.lost.count(Event::Frame);
         }
     }
+}
+
+/// Reads the frame at the output of a FIFO and releases its place; `None` where the FIFO does not release it.
+#[inline]
+pub(super) fn take(fifo: Fifo) -> Option<Mailbox> {
+    let output = registers().rx(fifo as usize);
+    let mailbox = Mailbox {
+        rir: output.rir().read().bits(),
+        rdtr: output.rdtr().read().bits(),
+        rdlr: output.rdlr().read().bits(),
+        rdhr: output.rdhr().read().bits(),
+    };
+    registers().rfr(fifo as usize).write(|w| w.rfom().set_bit());
+    // The next frame is at the output once the hardware has cleared the request, a few clocks later.
+    let is_released = (0..RELEASE_POLLS).any(|_| registers().rfr(fifo as usize).read().rfom().bit_is_clear());
+    is_released.then_some(mailbox)
 }

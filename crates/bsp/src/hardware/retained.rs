@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use update::{Crashes, Pair, Proof};
+use update::{Clears, Crashes, Pair, Proof};
 
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
@@ -21,6 +21,8 @@ struct Retained {
     erase_budget: [AtomicU32; 2],
     /// Tries of the clock, and their complement.
     clock_tries: AtomicU32,
+    /// Clears of staging that the budget has to make up for.
+    clears: AtomicU32,
 }
 
 /// `used` keeps the compiler from assuming the initial values, which a reset does not write.
@@ -35,6 +37,7 @@ static RETAINED: Retained = Retained {
     authorisation: [const { AtomicU32::new(0) }; 5],
     erase_budget: [const { AtomicU32::new(0) }; 2],
     clock_tries: AtomicU32::new(0),
+    clears: AtomicU32::new(0),
 };
 
 /// The mark of a development bootloader: 'DEVL'.
@@ -64,6 +67,17 @@ pub fn crashes() -> Crashes {
 /// Stores the count of crashes.
 pub fn set_crashes(crashes: Crashes) {
     RETAINED.crashes.store(crashes.word(), Ordering::Relaxed);
+}
+
+/// The budget of clears, as it was left.
+#[must_use]
+pub fn clears() -> Clears {
+    Clears::from_word(RETAINED.clears.load(Ordering::Relaxed))
+}
+
+/// Keeps the budget of clears.
+pub fn set_clears(clears: Clears) {
+    RETAINED.clears.store(clears.word(), Ordering::Relaxed);
 }
 
 /// The image whose signature was verified since power-on, identified by the CRC of its header.

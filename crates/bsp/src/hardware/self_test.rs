@@ -1,12 +1,16 @@
 //! Values of the board for its bring-up (2005h), each a word at a fixed address.
 //!
-//! With the feature `development` the program also counts errors of the bus, measures the erase, and has the commands that
-//! break it. A release shows zeros there.
+//! With the feature `development` the program also counts errors of the bus, measures the erase, tests the board at its
+//! start (`start_tests`), and has the commands that break it. A release shows zeros there.
 
 use core::sync::atomic::AtomicU32;
 
 use stm32f4xx_hal::pac::{CAN1, DBGMCU, FLASH, GPIOA, GPIOB, GPIOC, PWR, RCC};
+use stm32f4xx_hal::rcc::Rcc;
 
+use super::can::Controller;
+#[cfg(feature = "development")]
+use super::start_tests;
 use super::{retained, sampling, ssi};
 use crate::oversampling::WORDS;
 
@@ -34,11 +38,32 @@ pub(super) struct Seen {
     longest_erase: AtomicU32,
 }
 
+/// What the tests at the start have found. Written before the tasks run, apart from the stack.
+pub(super) static FOUND: Found = Found {
+    lsi: AtomicU32::new(0),
+    loop_back: AtomicU32::new(0),
+    clock_wait: AtomicU32::new(0),
+    free_stack: AtomicU32::new(0),
+};
+
+/// The words, in the order of their numbers.
+#[repr(C)]
+pub(super) struct Found {
+    /// The frequency of the LSI in hertz.
+    pub(super) lsi: AtomicU32,
+    /// 1: a frame in loop-back was received as it was sent. 0: not tested. Others: `start_tests::LoopBack`.
+    pub(super) loop_back: AtomicU32,
+    /// From the start of the program to the clock of the PLL, in microseconds.
+    pub(super) clock_wait: AtomicU32,
+    /// Bytes of the stack that the program has never used.
+    pub(super) free_stack: AtomicU32,
+}
+
 /// A block of words: its address and its length.
 type Block = (*const u32, u8);
 
 /// The values, by number from 0.
-const BLOCKS: [Block; 14] = [
+const BLOCKS: [Block; 15] = [
     (DBGMCU::ptr().cast(), 1),
     // RCC_CR, RCC_PLLCFGR, RCC_CFGR.
     (RCC::ptr().cast(), 3),
@@ -61,13 +86,19 @@ const BLOCKS: [Block; 14] = [
     (ssi::RECEIVED, 2),
     // The conversions of two milliseconds, two in a word.
     (sampling::CONVERSIONS, 2 * WORDS as u8),
+    ((&raw const FOUND).cast::<u32>(), (size_of::<Found>() / 4) as u8),
 ];
 
 /// The value with this number; 0 without one. A command breaks the program.
 #[inline(never)]
 pub fn value(number: u8) -> u32 {
     #[cfg(feature = "development")]
-    development::obey(number);
+    {
+        development::obey(number);
+        if number == start_tests::FREE_STACK {
+            start_tests::note_stack();
+        }
+    }
     let mut place = number;
     for (address, words) in BLOCKS {
         if place < words {
@@ -77,6 +108,32 @@ pub fn value(number: u8) -> u32 {
         place -= words;
     }
     0
+}
+
+/// To be called first: starts the measurement of the clock.
+pub(super) fn begin() {
+    #[cfg(feature = "development")]
+    start_tests::begin();
+}
+
+/// Takes note of the time to the clock of the PLL, and marks the stack.
+pub(super) fn note_clock() {
+    #[cfg(feature = "development")]
+    start_tests::note_clock();
+}
+
+/// Measures the LSI, which the watchdog has started.
+#[allow(unused_variables, reason = "a release measures nothing")]
+pub(super) fn note_lsi(rcc: &mut Rcc) {
+    #[cfg(feature = "development")]
+    start_tests::note_lsi(rcc);
+}
+
+/// Tests the controller in loop-back.
+#[allow(unused_variables, reason = "a release tests nothing")]
+pub(super) fn note_loop_back(controller: &mut Controller) {
+    #[cfg(feature = "development")]
+    start_tests::note_loop_back(controller);
 }
 
 /// Takes note of the error counters and of the last error on the bus. To be called every 20 ms.

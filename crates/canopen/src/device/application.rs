@@ -42,6 +42,13 @@ pub trait Application {
     /// Whether the device has an LSS slave (CiA 305, optional). Without one, the device needs a node-ID from its caller.
     const LSS: bool = true;
 
+    /// Whether a TPDO sends events ([`sends_events`](Application::sends_events)).
+    const SENDS_EVENTS: bool = false;
+
+    /// Whether PDOs take at most three quarters of the bus, so that heartbeat, EMCY and SDO always have room. A product
+    /// whose PDOs cannot fill the bus, and that is short of flash, can do without.
+    const BUS_SHARE: bool = true;
+
     /// The bits of the error register (1001h) that the device supports. Bit 0, the generic error, must be one of them
     /// (CiA 301, 7.5.2.2).
     fn register_bits(&self) -> u8 {
@@ -116,7 +123,7 @@ pub trait Application {
     fn error(&mut self, _class: ErrorClass, _image: &mut [u8]) {}
 
     /// Whether a TPDO sends events, such as the calls of a lift, instead of present values. `tpdo` is the number of the
-    /// TPDO, 1 to 512. Called whenever the communication parameters or the mapping of the TPDO change.
+    /// TPDO, 1 to 512. Only asked with [`SENDS_EVENTS`](Application::SENDS_EVENTS). Called whenever the communication parameters or the mapping of the TPDO change.
     ///
     /// Such a TPDO is sent once for each event from [`next_event`](Application::next_event), in the order of the
     /// events. A frame that waits for the bus is not replaced by a newer one. A changed value sends nothing by itself.

@@ -5,10 +5,10 @@ use super::pdos::low_half;
 use super::state::{Pending, SELF_START, Scope};
 use super::{Action, Application, Definition, STALE, store};
 use crate::array::Array;
-use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
+use crate::dictionary::{Dictionary, Entry, Field, Group, Services, little_endian};
 use crate::emcy::Fault;
 use crate::nmt::State;
-use crate::pdo::{Links, ProcessContext, Rpdo, Scanner, Tpdo};
+use crate::pdo::{Choices, Links, ProcessContext, Rpdo, Scanner, Tpdo};
 use crate::transmit::Context;
 use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_stamp};
 
@@ -22,10 +22,8 @@ pub struct Inner<D: Definition> {
     pub(super) is_bus_off: bool,
     /// Whether any TPDO sends events.
     pub(super) sends_events: bool,
-    /// The groups whose stored values could not be loaded: the defaults are in use.
-    pub(super) lost: Groups,
-    /// The groups whose newest stored values could not be loaded: the values of the save before are in use.
-    pub(super) older: Groups,
+    /// The groups whose newest stored values could not be loaded.
+    pub(super) damage: store::Damage,
     pub(super) pending: Pending,
     pub(super) jobs: store::Jobs,
     pub(super) dictionary: &'static Dictionary,
@@ -52,6 +50,11 @@ pub struct Inner<D: Definition> {
     pub(super) rpdos: D::Rpdos,
     pub(super) scanner: Scanner<D::Scanned>,
     pub(super) image: D::Image,
+}
+
+impl<D: Definition> Choices for Inner<D> {
+    const SENDS_EVENTS: bool = D::Application::SENDS_EVENTS;
+    const BUS_SHARE: bool = D::Application::BUS_SHARE;
 }
 
 impl<D: Definition> Inner<D> {
@@ -86,8 +89,7 @@ impl<D: Definition> Inner<D> {
             first_tpdos: Links::END,
             first_rpdos: Links::END,
             jobs: store::Jobs::new(),
-            lost: Groups::NONE,
-            older: Groups::NONE,
+            damage: store::Damage::NONE,
             is_bus_off: false,
             image: D::Image::filled(|| 0),
         }
@@ -257,7 +259,7 @@ impl<D: Definition> Inner<D> {
 
     /// Sends the process data that is due.
     #[inline]
-    pub(super) fn send_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(super) fn send_process(&mut self, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         if context.now >= self.process_due {
             self.run_process(context);
         }

@@ -56,6 +56,10 @@ impl LssSlave {
         self.slave.set_pending(Configuration { node_id, ..self.slave.pending() });
     }
 
+    pub(super) fn is_selected(&self) -> bool {
+        self.slave.is_selected()
+    }
+
     /// A reset of the device.
     pub(super) fn restart(&mut self) {
         self.slave.reset();

@@ -14,6 +14,7 @@ mod definition;
 mod emergencies;
 mod events;
 mod faults;
+mod indicators;
 mod inner;
 mod lss;
 mod more_sdo;
@@ -34,7 +35,7 @@ pub use application::Application;
 pub use definition::{Definition, Rows};
 pub use faults::BusEvent;
 pub use next::{Action, Next};
-pub use store::{Job, Soundness, Stored};
+pub use store::{Damage, Job, Soundness, Stored};
 
 use crate::dictionary::Dictionary;
 use crate::lss::BitRate;
@@ -67,7 +68,7 @@ impl<D: Definition> core::fmt::Debug for Device<D> {
 pub type ServiceDevice<A, const N: usize> = Device<Rows<A, N, 0, 0, 0, 0, 0, 0>>;
 
 /// A deadline in the past: the next poll checks everything.
-const STALE: Tick = Tick(0);
+const STALE: Tick = Tick::PAST;
 
 impl<D: Definition> Device<D> {
     /// A device that has not started: it neither sends nor receives until [`start`](Device::start). The bit rate is only

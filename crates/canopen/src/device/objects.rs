@@ -6,7 +6,7 @@ use super::pdos::low_half;
 use super::state::SELF_START;
 use super::store::check_program_control;
 use super::{Application, STALE};
-use crate::dictionary::{Entry, Rule, Services, Type, little_endian};
+use crate::dictionary::{Entry, Kind, Rule, Services, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Part, Writable};
 use crate::{CobId, Tick, sync, time_stamp};
 
@@ -26,8 +26,8 @@ impl<D: Definition> Objects for Inner<D> {
             self.application.read(&entry, self.image.as_mut())?;
         }
         match entry.attributes.kind {
-            Type::Domain => self.application.read_domain(at),
-            Type::VisibleString(_) => Ok(text(entry.field.get(self.image.as_ref()))),
+            Kind::Domain => self.application.read_domain(at),
+            Kind::Text => Ok(text(entry.field.get(self.image.as_ref()))),
             _ if entry.rule().is_computed() => self.computed(&entry),
             _ => Ok(entry.field.get(self.image.as_ref())),
         }

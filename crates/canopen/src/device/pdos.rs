@@ -179,7 +179,8 @@ impl<D: Definition> Inner<D> {
     /// Links the valid PDOs to chains, after a change of their settings.
     fn link_pdos(&mut self) {
         (self.first_tpdos, self.first_rpdos) = (Links::END, Links::END);
-        self.sends_events = self.tpdos.as_ref().iter().any(|tpdo| tpdo.events_of().is_some());
+        self.sends_events =
+            D::Application::SENDS_EVENTS && self.tpdos.as_ref().iter().any(|tpdo| tpdo.events_of().is_some());
         for (place, tpdo) in self.tpdos.as_mut().iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
@@ -215,9 +216,16 @@ impl<D: Definition> Inner<D> {
             inhibit: low_half(self.parameter(pdo, 3)),
             event: low_half(self.parameter(pdo, 5)),
             sync_start: low_byte(self.parameter(pdo, 6)),
-            events_of: Some(pdo.number()).filter(|number| self.application.sends_events(*number)),
+            events_of: self.events_of(pdo.number()),
             layout,
         })
+    }
+
+    /// The number of a TPDO that sends events.
+    fn events_of(&self, number: u16) -> Option<u16> {
+        let sends_events = self.application.sends_events(number);
+        debug_assert!(D::Application::SENDS_EVENTS || !sends_events, "`SENDS_EVENTS` is not set");
+        (D::Application::SENDS_EVENTS && sends_events).then_some(number)
     }
 
     fn rpdo_settings(&self, pdo: Pdo) -> Option<RpdoSettings> {
@@ -320,8 +328,8 @@ impl<D: Definition> Inner<D> {
     }
 
     /// The CAN-ID can change only while the PDO is not valid. A valid PDO needs a CAN-ID that CiA 301 does not
-    /// restrict, a mapping, and, for a type that depends on remote frames, remote frames allowed. A multiplexed PDO
-    /// needs an event-driven type.
+    /// restrict, a mapping, and, for a type that depends on remote frames, remote frames allowed. A device that ignores
+    /// remote frames does not allow them. A multiplexed PDO needs an event-driven type.
     ///
     /// A CAN-ID that a profile has pre-defined never changes, and is allowed for this PDO even if CiA 301 restricts it.
     fn check_cob_id(&self, pdo: Pdo, present: Option<CobId>, entry: &Entry, value: u32) -> Result<(), Abort> {
@@ -332,7 +340,8 @@ impl<D: Definition> Inner<D> {
         }
         let moves = present.is_some_and(|old| old.id != new.id);
         let transmission = Transmission::parse(low_byte(self.parameter(pdo, 2)));
-        let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
+        let is_asked = !Self::has(Services::REMOTE) && !new.bit30 && pdo.direction() == Direction::Transmit;
+        let contradicts = is_asked || new.bit30 && transmission.is_some_and(Transmission::needs_remote);
         let mapped = self.mapped(pdo);
         let is_not_sent = Self::addressing(pdo, mapped).is_some()
             && !transmission.is_some_and(Transmission::is_event_driven);
@@ -344,7 +353,8 @@ impl<D: Definition> Inner<D> {
     /// An RPDO is not requested by remote frames, so its type cannot depend on them.
     fn check_type(&self, pdo: Pdo, present: Option<CobId>, kind: u8) -> Result<(), Abort> {
         let transmission = Transmission::parse(kind).ok_or(Abort::InvalidValue)?;
-        let no_remote = pdo.direction() == Direction::Receive || present.is_some_and(|cob_id| cob_id.bit30);
+        let is_ignored = !Self::has(Services::REMOTE) || pdo.direction() == Direction::Receive;
+        let no_remote = is_ignored || present.is_some_and(|cob_id| cob_id.bit30);
         let is_multiplexed = present.is_some() && Self::addressing(pdo, self.mapped(pdo)).is_some();
         let is_not_sent = is_multiplexed && !transmission.is_event_driven();
         let has_no_sync = !Self::has(Services::SYNC) && transmission.is_synchronous();

@@ -3,13 +3,15 @@
 use super::Definition;
 use super::inner::Inner;
 use super::rpdos::filter_bit;
+use super::services::Services;
 use super::{Device, Next, STALE};
-use crate::dictionary::Services;
+use crate::dictionary::Services as Has;
 use crate::nmt::Command;
 use crate::pdo::{Chain, ProcessContext, Tpdo};
 use crate::sdo::Multiplexer;
 use crate::time_stamp::TimeOfDay;
 use crate::{Application, CanId, Frame, Instant, Span, Tick, Transmit};
+use core::marker::PhantomData;
 
 impl<D: Definition> Device<D> {
     /// Takes a frame for either half.
@@ -54,7 +56,7 @@ impl<D: Definition> Device<D> {
         if !Inner::<D>::has_process() || !is_of_process && now < self.inner.process_due {
             return;
         }
-        if D::SERVICES.contains(Services::TIME) && self.inner.on_time(frame) {
+        if D::SERVICES.contains(Has::TIME) && self.inner.on_time(frame) {
             return;
         }
         let context = &mut self.services.process_context(now, out);
@@ -62,6 +64,14 @@ impl<D: Definition> Device<D> {
             self.inner.take_pdo_frame(frame, context);
         }
         self.inner.send_process(context);
+    }
+
+    /// Result of a call for process data: deadlines only.
+    #[inline]
+    pub(super) fn process_next(&self) -> Next {
+        let Inner { process_due, services_due, .. } = self.inner;
+        let (process, services) = (self.clock.instant(process_due), self.clock.instant(services_due));
+        Next { process, services, action: None, parameters: false }
     }
 
     #[inline(never)]
@@ -144,7 +154,7 @@ impl<D: Definition> Device<D> {
             });
             let events_due = self.inner.send_events(context);
             self.inner.process_due = self.inner.process_due.min(events_due);
-            if Inner::<D>::has(Services::MULTIPLEXED_TPDO) {
+            if Inner::<D>::has(Has::MULTIPLEXED_TPDO) {
                 self.inner.scanner.on_change(self.inner.image.as_ref(), context);
                 self.inner.process_due = self.inner.process_due.min(self.inner.scanner.due());
             }
@@ -170,10 +180,30 @@ impl<D: Definition> Device<D> {
     }
 }
 
+impl<D: Definition> Services<D> {
+    /// The time and the transmit queue for one call of the device for its process data, which have a share of the bus.
+    pub(super) fn process_context<'a, Q: Transmit>(
+        &'a mut self,
+        now: Tick,
+        out: &'a mut Q,
+    ) -> ProcessContext<'a, Q, Inner<D>> {
+        if D::Application::BUS_SHARE {
+            self.budget.begin(now, || out.has_waiting_pdo());
+        }
+        ProcessContext {
+            now,
+            out,
+            is_open: !(D::Application::LSS && self.lss.is_switching()),
+            budget: &mut self.budget,
+            choices: PhantomData,
+        }
+    }
+}
+
 impl<D: Definition> Inner<D> {
     /// The CAN-ID of the RPDO that takes the frames of all nodes.
     fn all_nodes(&self) -> Option<CanId> {
-        if Self::has(Services::MULTIPLEXED_RPDO) { self.all_nodes.map(|(id, _)| id) } else { None }
+        if Self::has(Has::MULTIPLEXED_RPDO) { self.all_nodes.map(|(id, _)| id) } else { None }
     }
 
     /// How many frames the process data may take: NMT, SYNC, time stamp, RPDOs, requests for TPDOs.
@@ -186,9 +216,10 @@ impl<D: Definition> Inner<D> {
         let rpdos = self.rpdos.as_ref();
         match number {
             0 => Some(CanId::NMT),
-            1 => Some(self.sync.id()).filter(|_| Self::has(Services::SYNC)),
-            2 => self.time_stamp.consumed().filter(|_| Self::has(Services::TIME)),
+            1 => Some(self.sync.id()).filter(|_| Self::has(Has::SYNC)),
+            2 => self.time_stamp.consumed().filter(|_| Self::has(Has::TIME)),
             _ if number < 3 + rpdos.len() => rpdos.get(number - 3)?.id(),
+            _ if !Self::has(Has::REMOTE) => None,
             _ => self.tpdos.as_ref().get(number - 3 - rpdos.len())?.requested(),
         }
     }
@@ -212,22 +243,29 @@ impl<D: Definition> Inner<D> {
     #[inline]
     fn is_of_process(&self, frame: &Frame) -> bool {
         self.rpdo_filter & filter_bit(frame.id()) != 0
-            || frame.is_remote()
-            || Self::has(Services::SYNC) && self.sync.id().get() == frame.id()
-            || Self::has(Services::TIME)
+            || Self::has(Has::REMOTE) && frame.is_remote()
+            || Self::has(Has::SYNC) && self.sync.id().get() == frame.id()
+            || Self::has(Has::TIME)
     }
 
-    fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
-        if Self::has(Services::SYNC) && self.sync.accepts(frame) {
+    fn take_pdo_frame(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit, Self>) {
+        if Self::has(Has::SYNC) && self.sync.accepts(frame) {
             self.on_sync(frame, context);
         } else if frame.is_remote() {
+            self.on_remote(frame, context);
+        } else if Self::has(Has::RPDO) {
+            self.on_rpdo(frame, context.now);
+        }
+    }
+
+    /// Answers a remote frame with each TPDO of its CAN-ID.
+    fn on_remote(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit, Self>) {
+        if Self::has(Has::REMOTE) {
             self.each_tpdo(Chain::Valid, |tpdo, image, _| {
                 if tpdo.requested().is_some_and(|id| id.get() == frame.id()) {
                     tpdo.on_remote(image, context);
                 }
             });
-        } else if Self::has(Services::RPDO) {
-            self.on_rpdo(frame, context.now);
         }
     }
 
@@ -248,27 +286,27 @@ impl<D: Definition> Inner<D> {
     }
 
     #[inline(never)]
-    pub(super) fn run_process(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
-        if Self::has(Services::SYNC_PRODUCER) {
+    pub(super) fn run_process(&mut self, context: &mut ProcessContext<'_, impl Transmit, Self>) {
+        if Self::has(Has::SYNC_PRODUCER) {
             self.produce_sync(context);
         }
-        if Self::has(Services::SYNC) {
+        if Self::has(Has::SYNC) {
             self.poll_sync(context.now);
         }
-        let mut due = if Self::has(Services::RPDO) { self.poll_rpdos(context.now) } else { Tick::NEVER };
+        let mut due = if Self::has(Has::RPDO) { self.poll_rpdos(context.now) } else { Tick::NEVER };
         self.each_tpdo(Chain::Valid, |tpdo, image, _| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });
         due = due.min(self.send_events(context));
-        if Self::has(Services::MULTIPLEXED_TPDO) {
+        if Self::has(Has::MULTIPLEXED_TPDO) {
             self.scanner.poll(self.image.as_ref(), context);
             due = due.min(self.scanner.due());
         }
-        if Self::has(Services::SYNC) {
+        if Self::has(Has::SYNC) {
             due = due.min(self.sync.due());
         }
-        if Self::has(Services::SYNC_PRODUCER) {
+        if Self::has(Has::SYNC_PRODUCER) {
             due = due.min(self.sync_producer.due());
         }
         // Nothing that is due stays due: a deadline in the past would wake the caller for ever.

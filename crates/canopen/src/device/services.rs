@@ -2,12 +2,12 @@
 
 use super::inner::Inner;
 use super::lss::LssSlave;
-use super::{Application as _, Definition, Device, Next, STALE};
+use super::{Action, Application as _, Definition, Device, Next, STALE};
 use crate::array::Array;
 use crate::dictionary::Services as Has;
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
-use crate::pdo::{Budget, ProcessContext};
+use crate::pdo::Budget;
 use crate::sdo::{Abort, Channel};
 use crate::transmit::Context;
 use crate::{CanId, Frame, Instant, NodeId, Span, Tick, Transmit};
@@ -23,9 +23,9 @@ pub(super) struct Services<D: Definition> {
     /// The CAN-ID of requests to the server. A request has eight bytes (CiA 301, 7.2.4.3); any other frame is not a
     /// request.
     sdo_request: FullFrameId,
-    lss: LssSlave,
+    pub(super) lss: LssSlave,
     /// The share of process data in the bus.
-    budget: Budget,
+    pub(super) budget: Budget,
     sdo: Channel<Inner<D>>,
     /// The channels of 1201h and up.
     pub(super) more_sdo: D::Servers,
@@ -49,9 +49,14 @@ impl<D: Definition> Services<D> {
 
     /// Sets the bit rate at which the bus runs.
     pub(super) fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
-        if Inner::<D>::has_process() {
+        if D::Application::BUS_SHARE && Inner::<D>::has_process() {
             self.budget.set_bit_rate(bit_rate.kbit());
         }
+    }
+
+    /// Whether an LSS master configures the device.
+    pub(super) fn is_in_lss(&self) -> bool {
+        D::Application::LSS && self.lss.is_selected()
     }
 
     pub(super) fn set_node_id(&mut self, node_id: Option<NodeId>) {
@@ -81,7 +86,7 @@ impl<D: Definition> Services<D> {
         if D::Application::LSS {
             self.lss.shift(by);
         }
-        if Inner::<D>::has_process() {
+        if D::Application::BUS_SHARE && Inner::<D>::has_process() {
             self.budget.shift(by);
         }
     }
@@ -96,21 +101,6 @@ impl<D: Definition> Services<D> {
     pub(super) fn context<'a, Q: Transmit>(&self, now: Tick, out: &'a mut Q) -> Context<'a, Q> {
         Context { now, out, is_open: !(D::Application::LSS && self.lss.is_switching()) }
     }
-
-    /// The same for process data, which have a share of the bus.
-    pub(super) fn process_context<'a, Q: Transmit>(
-        &'a mut self,
-        now: Tick,
-        out: &'a mut Q,
-    ) -> ProcessContext<'a, Q> {
-        self.budget.begin(now, || out.has_waiting_pdo());
-        ProcessContext {
-            now,
-            out,
-            is_open: !(D::Application::LSS && self.lss.is_switching()),
-            budget: &mut self.budget,
-        }
-    }
 }
 
 /// The CAN-ID of requests to the SDO server. Without a node-ID, the CAN-ID for node-ID 0, which no client uses.
@@ -119,6 +109,16 @@ fn sdo_request(node_id: Option<NodeId>) -> FullFrameId {
 }
 
 impl<D: Definition> Inner<D> {
+    #[inline(never)]
+    fn hand_over(&mut self) -> Option<Action> {
+        let action = self.pending.take_action().or_else(|| self.jobs.hand_over().map(Action::Store));
+        self.pending.is_waiting = self.pending.has_action() || self.jobs.is_new();
+        if self.pending.is_waiting {
+            self.services_due = STALE;
+        }
+        action
+    }
+
     /// The data of a request with this identifier.
     #[inline]
     pub(super) fn request(frame: &Frame, id: FullFrameId) -> Option<&[u8; 8]> {
@@ -144,6 +144,21 @@ impl<D: Definition> Device<D> {
         let now = self.tick(now);
         self.send_due_services(now, out);
         self.services_next()
+    }
+
+    /// Result of a call for services, with one waiting action.
+    #[inline(never)]
+    pub(super) fn next(&mut self) -> Next {
+        self.services_next()
+    }
+
+    /// As [`next`](Device::next), for a caller that ignores a part of the result.
+    #[inline]
+    pub(super) fn services_next(&mut self) -> Next {
+        let inner = &mut self.inner;
+        let parameters = core::mem::take(&mut inner.pending.parameters);
+        let action = if inner.pending.is_waiting { inner.hand_over() } else { None };
+        Next { action, parameters, ..self.process_next() }
     }
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame), data and remote.

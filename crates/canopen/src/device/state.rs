@@ -3,7 +3,7 @@
 use super::Definition;
 use super::inner::Inner;
 use super::pdos::low_half;
-use super::{Action, Application, Device, Job, Next, STALE};
+use super::{Action, Application, Device, Next};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
 use crate::pdo::ProcessContext;
@@ -45,19 +45,17 @@ impl Scope {
 #[allow(clippy::struct_excessive_bools)] // Independent flags.
 pub(super) struct Pending {
     /// An action waits to be handed over.
-    is_waiting: bool,
+    pub(super) is_waiting: bool,
     /// The scope of the next start. The caller is told once (`reset_is_new`).
     reset: Reset,
     reset_is_new: bool,
     identifiers: bool,
-    parameters: bool,
+    pub(super) parameters: bool,
     /// The NMT state to enter later: Operational with the first measured values, if 1F80h asks for it; Stopped when the
     /// EMCYs of an error are sent, if 1029h asks for it. A command of the master cancels both.
     pub(super) next_state: Option<State>,
     /// A request of LSS or of program control.
     request: Option<Action>,
-    /// A job to store or restore values.
-    job: Option<Job>,
 }
 
 impl Pending {
@@ -70,18 +68,16 @@ impl Pending {
             parameters: false,
             next_state: None,
             request: None,
-            job: None,
         }
     }
 
-    /// The values have been loaded, so all identifiers and parameters may have changed. A job under way continues.
+    /// The values have been loaded, so all identifiers and parameters may have changed.
     fn values_loaded(&mut self) {
-        let job = self.job.take();
-        *self = Pending { identifiers: true, parameters: true, is_waiting: true, job, ..Pending::new() };
+        *self = Pending { identifiers: true, parameters: true, is_waiting: true, ..Pending::new() };
     }
 
-    fn has_action(&self) -> bool {
-        self.reset_is_new || self.identifiers || self.request.is_some() || self.job.is_some()
+    pub(super) fn has_action(&self) -> bool {
+        self.reset_is_new || self.identifiers || self.request.is_some()
     }
 
     fn reset(&mut self, reset: Reset) {
@@ -93,14 +89,9 @@ impl Pending {
         (self.request, self.is_waiting) = (Some(action), true);
     }
 
-    /// Asks the caller to store or restore values.
-    pub(super) fn ask_for(&mut self, job: Job) {
-        (self.job, self.is_waiting) = (Some(job), true);
-    }
-
-    /// Whether a job waits to be handed over.
-    pub(super) fn has_job(&self) -> bool {
-        self.job.is_some()
+    /// A job waits to be handed over.
+    pub(super) fn job_waits(&mut self) {
+        self.is_waiting = true;
     }
 
     pub(super) fn identifiers_changed(&mut self) {
@@ -111,8 +102,8 @@ impl Pending {
         self.parameters = true;
     }
 
-    /// The next action for the caller.
-    fn take_action(&mut self) -> Option<Action> {
+    /// The next action for the caller, other than a job.
+    pub(super) fn take_action(&mut self) -> Option<Action> {
         if core::mem::take(&mut self.reset_is_new) {
             return Some(match self.reset {
                 Reset::Node => Action::ResetNode,
@@ -122,10 +113,7 @@ impl Pending {
         if let Some(request) = self.request.take() {
             return Some(request);
         }
-        if core::mem::take(&mut self.identifiers) {
-            return Some(Action::Identifiers);
-        }
-        self.job.take().map(Action::Store)
+        core::mem::take(&mut self.identifiers).then_some(Action::Identifiers)
     }
 }
 
@@ -194,42 +182,9 @@ impl<D: Definition> Device<D> {
         self.inner.enter(state);
         self.silence_services();
     }
-
-    /// Result of a call for process data: deadlines only.
-    #[inline]
-    pub(super) fn process_next(&self) -> Next {
-        let Inner { process_due, services_due, .. } = self.inner;
-        let (process, services) = (self.clock.instant(process_due), self.clock.instant(services_due));
-        Next { process, services, action: None, parameters: false }
-    }
-
-    /// Result of a call for services, with one waiting action.
-    #[inline(never)]
-    pub(super) fn next(&mut self) -> Next {
-        self.services_next()
-    }
-
-    /// As [`next`](Device::next), for a caller that ignores a part of the result.
-    #[inline]
-    pub(super) fn services_next(&mut self) -> Next {
-        let inner = &mut self.inner;
-        let parameters = core::mem::take(&mut inner.pending.parameters);
-        let action = if inner.pending.is_waiting { inner.hand_over() } else { None };
-        Next { action, parameters, ..self.process_next() }
-    }
 }
 
 impl<D: Definition> Inner<D> {
-    #[inline(never)]
-    fn hand_over(&mut self) -> Option<Action> {
-        let action = self.pending.take_action();
-        self.pending.is_waiting = self.pending.has_action();
-        if self.pending.is_waiting {
-            self.services_due = STALE;
-        }
-        action
-    }
-
     /// A device without a node-ID has received one. The caller has to start the device again.
     pub(super) fn request_boot_up(&mut self) {
         self.pending.reset(Reset::Communication);
@@ -250,7 +205,7 @@ impl<D: Definition> Inner<D> {
 impl<D: Definition> Inner<D> {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
-    pub(super) fn self_start(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(super) fn self_start(&mut self, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         let next_state = &mut self.pending.next_state;
         if next_state.take_if(|state| *state == State::Operational).is_some() && self.emcy.register() == 0 {
             self.enter(State::Operational);

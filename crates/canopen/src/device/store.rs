@@ -60,10 +60,43 @@ pub enum Soundness {
     Lost,
 }
 
+/// The soundness of the stored values of all groups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Damage {
+    /// The groups whose stored values are lost.
+    lost: Groups,
+    /// The groups whose values are from the save before.
+    older: Groups,
+}
+
+impl Damage {
+    /// The stored values of every group are whole.
+    pub const NONE: Damage = Damage { lost: Groups::NONE, older: Groups::NONE };
+
+    /// Sets the soundness of a group.
+    pub fn set(&mut self, group: Group, soundness: Soundness) {
+        self.lost.set(group, soundness == Soundness::Lost);
+        self.older.set(group, soundness == Soundness::Older);
+    }
+
+    /// The soundness of a group.
+    #[must_use]
+    pub fn of(self, group: Group) -> Soundness {
+        match (self.lost.contains(group), self.older.contains(group)) {
+            (true, _) => Soundness::Lost,
+            (_, true) => Soundness::Older,
+            _ => Soundness::Whole,
+        }
+    }
+}
+
 /// The job under way, and the clients that wait for its end.
 #[derive(Debug)]
+#[allow(clippy::struct_excessive_bools)] // Independent flags.
 pub(super) struct Jobs {
     running: Option<Job>,
+    /// The job waits to be handed over.
+    is_new: bool,
     /// An equal request has followed the handover, so the job runs a second time.
     is_repeated: bool,
     /// Whether the SDO request just served has begun the job or waits for it.
@@ -73,7 +106,7 @@ pub(super) struct Jobs {
 
 impl Jobs {
     pub(super) const fn new() -> Jobs {
-        Jobs { running: None, is_repeated: false, is_deferred: false, lss_waits: false }
+        Jobs { running: None, is_new: false, is_repeated: false, is_deferred: false, lss_waits: false }
     }
 
     /// Whether the response to the request just served has to wait. Returns `true` once.
@@ -81,9 +114,14 @@ impl Jobs {
         core::mem::take(&mut self.is_deferred)
     }
 
-    /// The job that has to run a second time.
-    fn take_repeated(&mut self) -> Option<Job> {
-        self.running.filter(|_| core::mem::take(&mut self.is_repeated))
+    /// Whether the job waits to be handed over.
+    pub(super) fn is_new(&self) -> bool {
+        self.is_new
+    }
+
+    /// The job that waits to be handed over.
+    pub(super) fn hand_over(&mut self) -> Option<Job> {
+        self.running.filter(|_| core::mem::take(&mut self.is_new))
     }
 }
 
@@ -92,8 +130,10 @@ impl<D: Definition> Device<D> {
     /// handover, the job is handed over again instead, and the clients wait for the second run.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let now = self.tick(now);
-        if let Some(job) = self.inner.jobs.take_repeated() {
-            self.inner.pending.ask_for(job);
+        let jobs = &mut self.inner.jobs;
+        if jobs.running.is_some() && core::mem::take(&mut jobs.is_repeated) {
+            jobs.is_new = true;
+            self.inner.pending.job_waits();
             self.inner.services_due = STALE;
             return self.process_next();
         }
@@ -137,9 +177,9 @@ impl<D: Definition> Inner<D> {
     fn begin(&mut self, job: Job) -> Result<(), Abort> {
         self.check_job(job)?;
         if self.jobs.running.is_none() {
-            self.jobs.running = Some(job);
-            self.pending.ask_for(job);
-        } else if matches!(job, Job::Store(_)) && !self.pending.has_job() {
+            (self.jobs.running, self.jobs.is_new) = (Some(job), true);
+            self.pending.job_waits();
+        } else if matches!(job, Job::Store(_)) && !self.jobs.is_new {
             self.jobs.is_repeated = true;
         }
         Ok(())
@@ -219,8 +259,7 @@ impl<D: Definition> Inner<D> {
         let (dictionary, node_id) = (self.dictionary, self.node_id);
         // An application that stores nothing returns this constant, and the compiler removes the rest.
         if packed.is_empty() && soundness == Soundness::Whole {
-            self.lost.set(group, false);
-            self.older.set(group, false);
+            self.damage.set(group, soundness);
             return self.application.loaded(group, true);
         }
         let fits = dictionary.unpack(group, node_id, packed, self.image.as_mut()).is_ok()
@@ -228,18 +267,18 @@ impl<D: Definition> Inner<D> {
         if !fits {
             self.load_defaults(Scope::Group(group));
         }
-        self.lost.set(group, !fits || soundness == Soundness::Lost);
-        self.older.set(group, fits && soundness == Soundness::Older);
-        self.application.loaded(group, fits && soundness == Soundness::Whole);
+        let soundness = if fits { soundness } else { Soundness::Lost };
+        self.damage.set(group, soundness);
+        self.application.loaded(group, soundness == Soundness::Whole);
     }
 
     /// Reports groups that could not be loaded, by EMCY.
     pub(super) fn report_stored(&mut self, now: Tick) {
         let groups = if Self::has(Services::OWN_GROUPS) { &Group::ALL[..] } else { &Group::COMMON[..] };
         for &group in groups {
-            let (lost, older) = (self.lost.contains(group), self.older.contains(group));
-            self.set_fault(Fault::StoredData(group), lost, now);
-            self.set_fault(Fault::OlderData(group), older, now);
+            let soundness = self.damage.of(group);
+            self.set_fault(Fault::StoredData(group), soundness == Soundness::Lost, now);
+            self.set_fault(Fault::OlderData(group), soundness == Soundness::Older, now);
         }
     }
 }

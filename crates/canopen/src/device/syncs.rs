@@ -39,7 +39,7 @@ impl<D: Definition> Inner<D> {
 
     /// Sends the SYNC that is due, and reacts to it as to the SYNC of another node. Nothing precedes the boot-up message.
     #[inline(never)]
-    pub(super) fn produce_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(super) fn produce_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         if context.now < self.sync_producer.due() {
             return;
         }
@@ -53,7 +53,7 @@ impl<D: Definition> Inner<D> {
         }
     }
 
-    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         let Ok(sync) = self.sync.take(frame, context.now) else {
             return self.report(Fault::SyncLength, context.now);
         };
@@ -70,7 +70,7 @@ impl<D: Definition> Inner<D> {
         }
         self.application.synchronised(sync.counter, self.image.as_mut());
         self.each_tpdo(Chain::Synchronous, |tpdo, image, _| tpdo.on_sync(sync, image, context));
-        if self.sends_events {
+        if D::Application::SENDS_EVENTS && self.sends_events {
             self.send_events_with_sync(context);
         }
         self.process_due = self.process_due.min(self.sync.due());

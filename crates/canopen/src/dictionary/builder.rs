@@ -3,8 +3,7 @@
 #![allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 
 use super::compile::{effective_limits, event_timer, object_len, series_len};
-use super::entry::Attributes;
-use super::limits::Limits;
+use super::entry::{Attributes, Kind, Limits};
 use super::tables::{Place, Series};
 use super::{Counts, DefaultValue, Group, Object, Rule, check, image_size};
 
@@ -212,8 +211,8 @@ pub(super) const fn larger(a: usize, b: usize) -> usize {
 
 pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
     a.limits.is_same(b.limits)
-        && a.kind.code() == b.kind.code()
-        && a.kind.size() == b.kind.size()
+        && a.kind as u8 == b.kind as u8
+        && a.size == b.size
         && a.rule.code() == b.rule.code()
         && a.access as u8 == b.access as u8
         && a.mapping as u8 == b.mapping as u8
@@ -252,7 +251,8 @@ pub(super) const fn attributes(row: &Object) -> Attributes {
     let (low, high) = effective_limits(row);
     Attributes {
         limits: Limits::new(row.kind, low, high),
-        kind: row.kind,
+        kind: Kind::of(row.kind),
+        size: row.kind.size(),
         access: row.access,
         mapping: row.mapping,
         group: row.group,

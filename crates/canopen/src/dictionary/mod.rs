@@ -15,7 +15,6 @@ mod entry;
 mod fail;
 mod field;
 mod group;
-mod limits;
 mod object;
 mod packed;
 mod pdo;
@@ -24,13 +23,14 @@ mod services;
 mod tables;
 mod transmission;
 mod types;
+mod variable;
 
 #[doc(hidden)]
 pub use builder::TableBuilder;
 pub use check::check;
 pub use compile::{Counts, Sizes, compile, count, gather, image_size, pdos, scanned, servers, watches};
 pub use entry::Entry;
-pub(crate) use entry::little_endian;
+pub(crate) use entry::{Kind, little_endian};
 pub(crate) use fail::fail;
 pub use field::Field;
 pub use group::{Group, Groups};
@@ -45,3 +45,4 @@ pub use tables::{Dictionary, Entries, Tables};
 #[doc(hidden)]
 pub use transmission::Transmission;
 pub use types::Type;
+pub use variable::{Number, Variable};

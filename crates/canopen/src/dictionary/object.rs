@@ -94,8 +94,9 @@ pub struct Object {
     pub group: Option<Group>,
     /// Physical unit, for documents; empty where there is none.
     pub unit: &'static str,
-    /// The behaviour of the entry beyond holding a value.
-    pub rule: Rule,
+    /// The behaviour of the entry beyond holding a value. Only the methods below set it, so that no row of CiA 301 loses
+    /// its rule.
+    pub(crate) rule: Rule,
     /// A write makes the device act, although the value is stored: a preset, for example.
     pub acts: bool,
 }
@@ -263,6 +264,12 @@ impl Object {
     const fn with(mut self, rule: Rule) -> Object {
         self.rule = rule;
         self
+    }
+
+    /// The behaviour of the entry beyond holding a value.
+    #[must_use]
+    pub const fn rule(&self) -> Rule {
+        self.rule
     }
 
     /// Index and sub-index as one number. Rows are sorted by this number.

@@ -1,7 +1,7 @@
 //! The services that the rows of a table ask for.
 
 use super::compile::can_be_multiplexed;
-use super::{Object, Rule};
+use super::{DefaultValue, Object, Rule};
 
 /// The services of a [`Device`](crate::Device). The code of a service outside the set is not linked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +41,10 @@ impl Services {
     /// Storage groups of the product: the rows have a sub-index of 4 and up in 1010h or 1011h.
     pub const OWN_GROUPS: Services = Services(1 << 12);
 
+    /// Answers to remote frames: the rows have a TPDO whose COB-ID allows them by default, or of type 252 or 253. All
+    /// other TPDOs are those of [`without_remote`](crate::objects::without_remote).
+    pub const REMOTE: Services = Services(1 << 13);
+
     /// TPDOs, RPDOs, the heartbeat consumer, the multiplexed TPDO and further SDO servers follow from the numbers in
     /// [`Sizes`](super::Sizes).
     pub(crate) const TPDO: Services = Services(1 << 16);
@@ -74,6 +78,9 @@ impl Services {
                 Rule::ProgramControl => Services::PROGRAM_CONTROL,
                 Rule::StartUp => Services::SELF_START,
                 Rule::PdoCount if row.index < 0x1800 && can_be_multiplexed(row) => Services::MULTIPLEXED_RPDO,
+                Rule::PdoCobId | Rule::PdoPredefined | Rule::PdoType if answers_remote(row) => {
+                    Services::REMOTE
+                }
                 _ => Services::NONE,
             });
             i += 1;
@@ -108,4 +115,16 @@ impl Services {
     pub(crate) const fn from_bits(bits: u32) -> Services {
         Services(bits)
     }
+}
+
+/// Whether a row of a TPDO, its COB-ID or its type, makes the TPDO answer remote frames.
+const fn answers_remote(row: &Object) -> bool {
+    let value = match row.default {
+        DefaultValue::Integer(value) => value,
+        DefaultValue::NodeId(base) => base as i64,
+        _ => 0,
+    };
+    let is_sent = row.index & 0xFE00 == 0x1800;
+    is_sent
+        && if matches!(row.rule, Rule::PdoType) { matches!(value, 252 | 253) } else { value & 1 << 30 == 0 }
 }

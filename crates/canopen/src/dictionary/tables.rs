@@ -13,7 +13,7 @@
 //! of the same shape share their places, and entries share equal attributes. A sequence of default values is stored
 //! once. All dictionaries that are compiled together share these tables.
 
-use super::entry::{Attributes, little_endian};
+use super::entry::{Attributes, Kind, little_endian};
 use super::fail::fail;
 use super::{Direction, Entry, Field};
 use crate::NodeId;
@@ -184,7 +184,7 @@ impl Dictionary {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
         let before = if number == 0 { 0 } else { number.wrapping_mul(self.stride(series)) };
         let offset = series.offset.wrapping_add(before).wrapping_add(place.offset);
-        let field = Field { offset, size: attributes.kind.size() };
+        let field = Field { offset, size: attributes.size };
         Some(Entry { attributes, field, sub: place.sub, index: series.index.wrapping_add(number) })
     }
 
@@ -195,16 +195,21 @@ impl Dictionary {
         let Some((_, [attributes, ..])) = self.attributes.split_at_checked(last.attributes as usize) else {
             return 0;
         };
-        last.offset.wrapping_add(attributes.kind.size() as u16)
+        last.offset.wrapping_add(attributes.size as u16)
     }
 
     /// The location of a value, for use at compile time.
     ///
     /// # Panics
     /// During compilation, when there is no such entry.
-    #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
     #[must_use]
     pub const fn field(&self, index: u16, sub: u8) -> Field {
+        self.location(index, sub).0
+    }
+
+    /// The location of a value and its kind, for use at compile time.
+    #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+    pub(super) const fn location(&self, index: u16, sub: u8) -> (Field, Kind) {
         let mut i = 0;
         while i < self.series.len()
             && (index < self.series[i].index || index - self.series[i].index >= self.series[i].objects as u16)
@@ -223,9 +228,9 @@ impl Dictionary {
             fail(index, sub, "no such sub-index in the dictionary");
         }
         let Place { offset, attributes, .. } = self.places[place];
-        let size = self.attributes[attributes as usize].kind.size();
+        let Attributes { kind, size, .. } = self.attributes[attributes as usize];
         let object = series.offset + (index - series.index) * self.stride(series);
-        Field { offset: object.wrapping_add(offset), size }
+        (Field { offset: object.wrapping_add(offset), size }, kind)
     }
 }
 

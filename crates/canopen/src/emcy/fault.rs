@@ -136,6 +136,25 @@ impl Fault {
     /// `conditions` are the conditions of the application.
     #[must_use]
     pub fn condition(self, conditions: &[Condition]) -> Condition {
+        if let Fault::Application(number) = self {
+            return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
+        }
+        let [low, high] = self.detail().to_le_bytes();
+        let (register, class) = match self {
+            Fault::StoredData(_) | Fault::OlderData(_) => (0, Some(ErrorClass::DEVICE)),
+            Fault::Heartbeat(_) | Fault::LifeGuard => (COMMUNICATION, Some(ErrorClass::COMMUNICATION)),
+            _ => (COMMUNICATION, None),
+        };
+        Condition { code: self.code(), register, detail: [low, high, 0, 0, 0], class }
+    }
+
+    /// The emergency error code of a fault that is not one of the application.
+    fn code(self) -> u16 {
+        let sub = match self {
+            Fault::StoredData(group) | Fault::OlderData(group) => group.sub(),
+            _ => 0,
+        };
+        // Constants only: the compiler makes a table of them.
         let code = match self {
             Fault::Overrun => 0x8110,
             Fault::ErrorPassive => 0x8120,
@@ -147,18 +166,10 @@ impl Fault {
             Fault::RpdoTooShort(_) => 0x8210,
             Fault::RpdoTooLong(_) => 0x8220,
             Fault::RpdoDeadline(_) => 0x8250,
-            Fault::StoredData(group) | Fault::OlderData(group) => 0x6300 | u16::from(group.sub()),
-            Fault::Application(number) => {
-                return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
-            }
+            Fault::StoredData(_) | Fault::OlderData(_) => 0x6300,
+            Fault::Application(_) => 0x1000,
         };
-        let [low, high] = self.detail().to_le_bytes();
-        let (register, class) = match self {
-            Fault::StoredData(_) | Fault::OlderData(_) => (0, Some(ErrorClass::DEVICE)),
-            Fault::Heartbeat(_) | Fault::LifeGuard => (COMMUNICATION, Some(ErrorClass::COMMUNICATION)),
-            _ => (COMMUNICATION, None),
-        };
-        Condition { code, register, detail: [low, high, 0, 0, 0], class }
+        code | u16::from(sub)
     }
 
     /// The start of the error field: the sub-index of a heartbeat, the number of an RPDO; for stored data, the values
@@ -186,26 +197,31 @@ pub(crate) struct FaultSet {
 impl FaultSet {
     pub(crate) const EMPTY: FaultSet = FaultSet { single: 0, application: 0, several: 0 };
 
-    /// Adds a fault. Returns whether the fault is new.
-    pub(crate) fn insert(&mut self, fault: Fault) -> bool {
-        let before = *self;
-        match (fault, fault.bit()) {
-            (Fault::Application(number), _) => self.application |= application_bit(number),
-            (_, Some(bit)) => self.single |= 1 << bit,
-            (_, None) => self.several = self.several.saturating_add(1),
-        }
-        *self != before
+    /// Adds a fault or removes it. Returns whether this is a change.
+    #[inline(never)]
+    pub(crate) fn set(&mut self, fault: Fault, is_active: bool) -> bool {
+        let (set, bit) = match (fault, fault.bit()) {
+            (Fault::Application(number), _) => (&mut self.application, application_bit(number)),
+            (_, Some(bit)) => (&mut self.single, 1 << bit),
+            (_, None) => {
+                let before = self.several;
+                self.several = if is_active { before.saturating_add(1) } else { before.saturating_sub(1) };
+                return self.several != before;
+            }
+        };
+        let before = *set;
+        *set = if is_active { before | bit } else { before & !bit };
+        *set != before
     }
 
-    /// Removes a fault. Returns whether the fault was active.
-    pub(crate) fn remove(&mut self, fault: Fault) -> bool {
-        let before = *self;
-        match (fault, fault.bit()) {
-            (Fault::Application(number), _) => self.application &= !application_bit(number),
-            (_, Some(bit)) => self.single &= !(1 << bit),
-            (_, None) => self.several = self.several.saturating_sub(1),
-        }
-        *self != before
+    /// Whether a fault is active that can be active only once; never for others.
+    pub(crate) fn has(self, fault: Fault) -> bool {
+        fault.bit().is_some_and(|bit| self.single & 1 << bit != 0)
+    }
+
+    /// Whether stored values could not be loaded.
+    pub(crate) fn has_stored_data(self) -> bool {
+        self.single & !Fault::OF_COMMUNICATION != 0
     }
 
     pub(crate) fn is_empty(self) -> bool {
@@ -229,9 +245,13 @@ impl FaultSet {
             return 0;
         }
         let is_communication = self.single & Fault::OF_COMMUNICATION != 0 || self.several != 0;
-        let active =
-            (0..).zip(conditions).filter(|(number, _)| self.application & application_bit(*number) != 0);
-        let own = active.fold(0, |register, (_, condition)| register | condition.register);
+        let (mut active, mut own) = (self.application, 0);
+        for condition in conditions {
+            if active & 1 != 0 {
+                own |= condition.register;
+            }
+            active >>= 1;
+        }
         own | GENERIC | if is_communication { COMMUNICATION } else { 0 }
     }
 }
@@ -249,9 +269,9 @@ mod tests {
     fn every_fault_has_its_own_bit() {
         let all = || (0..Fault::SINGLES).filter_map(Fault::single).chain((0..32).map(Fault::Application));
         let mut set = FaultSet::default();
-        assert!(all().all(|fault| set.insert(fault)));
+        assert!(all().all(|fault| set.set(fault, true)));
         assert!(set.singles().eq(all()));
-        assert!(all().all(|fault| set.remove(fault)));
+        assert!(all().all(|fault| set.set(fault, false)));
         assert!(set.is_empty());
     }
 
@@ -260,7 +280,7 @@ mod tests {
         let conditions = [Condition { register: 0b100, ..Condition::new(0x3110) }];
         let of = |fault| {
             let mut set = FaultSet::default();
-            set.insert(fault);
+            set.set(fault, true);
             set.register(&conditions)
         };
         assert_eq!(FaultSet::default().register(&conditions), 0);

@@ -17,12 +17,11 @@ impl History {
         History { count: 0, newest: 0, errors: [[0; 4]; DEPTH as usize] }
     }
 
-    /// Adds an error with its code and what is known about it.
-    pub(crate) fn push(&mut self, code: u16, detail: [u8; 2]) {
+    /// Adds an error: its code, and two bytes of its error field.
+    pub(crate) fn push(&mut self, error: [u8; 4]) {
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.errors.get_mut(usize::from(self.newest)) {
-            let ([low, high], [first, second]) = (code.to_le_bytes(), detail);
-            *place = [low, high, first, second];
+            *place = error;
         }
         self.count = (self.count + 1).min(DEPTH);
     }
@@ -50,7 +49,7 @@ mod tests {
     #[test]
     fn ten_errors_newest_first() {
         let mut history = History::new();
-        (1..=12).for_each(|code| history.push(code, [1, 2]));
+        (1..=12).for_each(|code| history.push([code, 0, 1, 2]));
         assert_eq!(*history.count(), 10);
         assert_eq!(history.error(1), Some(&[12, 0, 1, 2]));
         assert_eq!(history.error(10), Some(&[3, 0, 1, 2]));

@@ -4,7 +4,6 @@ use super::history::History;
 use super::{Condition, ErrorClass, Fault, FaultSet, Message};
 use crate::transmit::{Context, RETRY};
 use crate::{CobId, Frame, Span, Tick, Transmit};
-use heapless::Deque;
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
 /// one.
@@ -15,6 +14,36 @@ pub(crate) const OFF: u32 = 1 << 31;
 
 /// The error field of a fault of the application; `None` for the one of its condition.
 pub(crate) type Detail = Option<[u8; 5]>;
+
+/// Messages that wait, as frames.
+#[derive(Debug)]
+struct Queue {
+    first: u8,
+    len: u8,
+    messages: [[u8; 8]; WAITING],
+}
+
+impl Queue {
+    const EMPTY: Queue = Queue { first: 0, len: 0, messages: [[0; 8]; WAITING] };
+
+    /// Adds a message. In a full queue, it replaces the newest one.
+    fn push(&mut self, message: [u8; 8]) {
+        self.len += u8::from(usize::from(self.len) < WAITING);
+        let place = usize::from(self.first + self.len - 1) % WAITING;
+        if let Some(place) = self.messages.get_mut(place) {
+            *place = message;
+        }
+    }
+
+    fn front(&self) -> Option<[u8; 8]> {
+        self.messages.get(usize::from(self.first)).copied().filter(|_| self.len != 0)
+    }
+
+    /// Removes the oldest message of a queue that has any.
+    fn pop(&mut self) {
+        (self.first, self.len) = ((self.first + 1) % WAITING as u8, self.len.saturating_sub(1));
+    }
+}
 
 /// The active faults, their history and the waiting messages.
 #[derive(Debug)]
@@ -27,7 +56,7 @@ pub(crate) struct Producer {
     id: Option<CobId>,
     active: FaultSet,
     history: History,
-    waiting: Deque<Message, WAITING>,
+    waiting: Queue,
     /// 1015h, in 100 us.
     inhibit: u16,
     /// When the last message was sent, or `NEVER`.
@@ -45,7 +74,7 @@ impl Producer {
             id: None,
             active: FaultSet::EMPTY,
             history: History::new(),
-            waiting: Deque::new(),
+            waiting: Queue::EMPTY,
             inhibit: 0,
             sent_at: Tick::NEVER,
             due: Tick::NEVER,
@@ -96,7 +125,7 @@ impl Producer {
     #[inline(never)]
     fn raise_singles(&mut self, faults: FaultSet, details: impl Fn(u8) -> Detail, now: Tick) {
         for fault in faults.singles() {
-            self.active.insert(fault);
+            self.active.set(fault, true);
             let detail = if let Fault::Application(number) = fault { details(number) } else { None };
             self.errors |= self.repeat(fault, detail, now);
         }
@@ -104,7 +133,7 @@ impl Producer {
 
     /// Sets a fault. Returns whether the fault is new.
     pub(crate) fn raise(&mut self, fault: Fault, detail: Detail, now: Tick) -> bool {
-        let is_new = self.active.insert(fault);
+        let is_new = self.active.set(fault, true);
         if is_new {
             self.errors |= self.repeat(fault, detail, now);
         }
@@ -113,7 +142,7 @@ impl Producer {
 
     /// As [`Producer::raise`], for a device without EMCY: no message waits.
     pub(crate) fn raise_silently(&mut self, fault: Fault) -> bool {
-        let is_new = self.active.insert(fault);
+        let is_new = self.active.set(fault, true);
         if is_new {
             self.errors |= fault.condition(self.conditions).class.map_or(0, error_bit);
         }
@@ -122,7 +151,7 @@ impl Producer {
 
     /// As [`Producer::clear`], for a device without EMCY.
     pub(crate) fn clear_silently(&mut self, fault: Fault) -> bool {
-        self.active.remove(fault)
+        self.active.set(fault, false)
     }
 
     /// As [`Producer::restart`], for a device without EMCY.
@@ -163,18 +192,18 @@ impl Producer {
 
     /// Discards the waiting messages.
     pub(crate) fn forget_waiting(&mut self) {
-        self.waiting.clear();
+        self.waiting.len = 0;
         self.due = Tick::NEVER;
     }
 
     /// Whether no message waits.
     pub(crate) fn is_idle(&self) -> bool {
-        self.waiting.is_empty()
+        self.waiting.len == 0
     }
 
     /// Clears a fault. Returns whether the fault was active. After the last active fault, code 0000h is sent.
     pub(crate) fn clear(&mut self, fault: Fault, now: Tick) -> bool {
-        let was_active = self.active.remove(fault);
+        let was_active = self.active.set(fault, false);
         if was_active && self.active.is_empty() {
             self.report(0, [0; 5], now);
         }
@@ -185,11 +214,7 @@ impl Producer {
         let message = Message { code, register: self.register(), detail };
         // In a full queue, the message replaces the newest one. The older messages tell how the trouble began; this
         // message tells the present state.
-        if self.waiting.push_back(message).is_err()
-            && let Some(newest) = self.waiting.back_mut()
-        {
-            *newest = message;
-        }
+        self.waiting.push(message.encode());
         self.due = self.due.min(self.next_due(now));
     }
 
@@ -197,6 +222,16 @@ impl Producer {
     #[inline(never)]
     pub(crate) fn register(&self) -> u8 {
         self.active.register(self.conditions) & self.register_bits
+    }
+
+    /// Whether a fault is active that can be active only once.
+    pub(crate) fn has(&self, fault: Fault) -> bool {
+        self.active.has(fault)
+    }
+
+    /// Whether stored values could not be loaded.
+    pub(crate) fn has_stored_data(&self) -> bool {
+        self.active.has_stored_data()
     }
 
     pub(crate) fn history(&self) -> &History {
@@ -220,17 +255,18 @@ impl Producer {
         }
         let Some(cob_id) = self.id else { return self.forget_waiting() };
         while let Some(message) = self.waiting.front() {
-            if !context.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
+            if !context.send(Frame::data_frame(cob_id.id, 8, message)) {
                 self.due = context.now.plus(RETRY);
                 return;
             }
-            if message.code != 0 {
-                let [first, second, ..] = message.detail;
-                self.history.push(message.code, if lists_detail { [first, second] } else { [0; 2] });
+            let [low, high, _, first, second, ..] = message;
+            if [low, high] != [0; 2] {
+                let detail = if lists_detail { [first, second] } else { [0; 2] };
+                self.history.push([low, high, detail[0], detail[1]]);
             }
-            let _ = self.waiting.pop_front();
+            self.waiting.pop();
             self.sent_at = context.now;
-            if self.inhibit != 0 && !self.waiting.is_empty() {
+            if self.inhibit != 0 && self.waiting.len != 0 {
                 self.due = self.next_due(context.now);
                 return;
             }

@@ -54,7 +54,7 @@ impl Producer {
     /// The latest instant at which a consumer with a time of 1.5 periods still expects the next heartbeat.
     pub(crate) fn latest(&self) -> Tick {
         match self.due {
-            _ if self.boot_up => Tick(0),
+            _ if self.boot_up => Tick::PAST,
             Tick::NEVER => Tick::NEVER,
             due => due.plus(Span::from_millis(self.period / 2)),
         }

@@ -77,6 +77,11 @@ impl Slave {
         self.pending = pending;
     }
 
+    /// Whether the slave is in the configuration state.
+    pub(crate) fn is_selected(&self) -> bool {
+        self.is_selected
+    }
+
     /// After a reset of any kind: back to the waiting state.
     pub(crate) fn reset(&mut self) {
         *self = Slave::new(self.pending);

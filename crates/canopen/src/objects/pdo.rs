@@ -71,6 +71,29 @@ pub const fn multiplexed<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
     rows
 }
 
+/// Makes TPDOs ignore remote frames: bit 30 of the default COB-ID is set. A device links the answers to remote frames only
+/// if one of its TPDOs allows them; otherwise, a client cannot switch them on. CiA recommends to do without them.
+///
+/// ```
+/// use canopen::objects;
+/// const ROWS: [canopen::dictionary::Object; 15] = objects::without_remote(objects::tpdo(2, &[]));
+/// ```
+#[must_use]
+pub const fn without_remote<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
+    let mut i = 0;
+    while i < N {
+        if matches!(rows[i].rule, Rule::PdoCobId | Rule::PdoPredefined) && rows[i].index & 0xFE00 == 0x1800 {
+            rows[i].default = match rows[i].default {
+                DefaultValue::NodeId(base) => DefaultValue::NodeId(base | 1 << 30),
+                DefaultValue::Integer(value) => DefaultValue::Integer(value | 1 << 30),
+                other => other,
+            };
+        }
+        i += 1;
+    }
+    rows
+}
+
 /// A mapped object: index, sub-index and length in bits.
 #[must_use]
 pub const fn slot(index: u16, sub: u8, mapped: i64) -> Object {

@@ -1,4 +1,4 @@
-//! The share of the bus that the process data of this node may take.
+//! One call of the device for its process data, and the share of the bus that they may take.
 //!
 //! The CAN-IDs of PDOs are more urgent than those of SDO and heartbeat. A node whose PDOs fill the bus would silence its
 //! own heartbeat and its own SDO server, and no master could correct its settings. PDOs therefore take at most three
@@ -8,7 +8,8 @@
 //! A burst leaves the bus to the services again after 36 ms and the time of four PDOs at most, 90 ms at 10 kbit/s.
 
 use crate::transmit::RETRY;
-use crate::{Span, Tick};
+use crate::{Frame, Span, Tick, Transmit};
+use core::marker::PhantomData;
 
 /// The share: `SHARE` / 4 of the bus.
 const SHARE: u32 = 3;
@@ -51,10 +52,10 @@ impl Budget {
         Budget {
             kbit,
             claimant: 0,
-            claim_end: Tick(0),
+            claim_end: Tick::PAST,
             credit: limit(kbit),
             enough: ENOUGH,
-            refilled: Tick(0),
+            refilled: Tick::PAST,
             after_refill: limit(kbit),
             unsent: 0,
         }
@@ -93,7 +94,7 @@ impl Budget {
         let is_admitted = self.credit >= cost(len) || self.kbit == 0;
         self.claimant = id;
         (self.claim_end, self.enough) =
-            if is_admitted { (Tick(0), ENOUGH) } else { (now.plus(CLAIM), u32::MAX) };
+            if is_admitted { (Tick::PAST, ENOUGH) } else { (now.plus(CLAIM), u32::MAX) };
         is_admitted
     }
 
@@ -106,7 +107,7 @@ impl Budget {
     /// that others hold the bus. Then nothing is earned: the PDOs leave the next gaps to less urgent frames.
     #[inline(never)]
     fn refill(&mut self, now: Tick, is_waiting: bool) {
-        let elapsed = now.0.saturating_sub(self.refilled.0).min(FULL_AFTER);
+        let elapsed = now.since(self.refilled).min(FULL_AFTER);
         let passed = elapsed * u32::from(self.kbit);
         let spent = self.after_refill.saturating_sub(self.credit);
         self.unsent = (self.unsent + spent).saturating_sub(passed);
@@ -129,6 +130,74 @@ const fn cost(len: usize) -> u32 {
     bits * 1000
 }
 
+/// What a product has chosen. The compiler removes the code of the rest.
+pub(crate) trait Choices {
+    /// Some TPDOs send events.
+    const SENDS_EVENTS: bool;
+    /// The PDOs leave a share of the bus to the services.
+    const BUS_SHARE: bool;
+}
+
+/// One call of the device for its process data, which have a share of the bus.
+pub(crate) struct ProcessContext<'a, T, C> {
+    pub(crate) now: Tick,
+    pub(crate) out: &'a mut T,
+    pub(crate) is_open: bool,
+    pub(crate) budget: &'a mut Budget,
+    pub(crate) choices: PhantomData<C>,
+}
+
+impl<T: Transmit, C: Choices> ProcessContext<'_, T, C> {
+    /// Queues a PDO with present values, which a newer one may replace. `false` when there is no room beside the services,
+    /// or the process data have taken their share of the bus.
+    #[inline]
+    pub(crate) fn send_pdo(&mut self, frame: Frame) -> bool {
+        let (id, len) = (frame.id(), frame.len());
+        let replaces = self.out.replaces(id);
+        let is_admitted = self.room() > ROOM_FOR_SERVICES && (replaces || self.admits(id, len));
+        is_admitted && self.out.send_state(frame).is_ok() && (replaces || self.spend(len))
+    }
+
+    /// Queues a PDO that no newer one may replace: a multiplexed PDO, or one with an event. `false` when there is no room
+    /// beside all others, or the process data have taken their share of the bus.
+    pub(crate) fn send_event(&mut self, frame: Frame) -> bool {
+        let len = frame.len();
+        self.takes_event(frame.id(), len) && self.out.send(frame).is_ok() && self.spend(len)
+    }
+
+    /// Queues a SYNC or a time stamp. `false` when there is no room.
+    pub(crate) fn send(&mut self, frame: Frame) -> bool {
+        self.is_open && self.out.send(frame).is_ok()
+    }
+
+    /// Whether `send_event` would take a frame with this CAN-ID and number of bytes now.
+    pub(crate) fn takes_event(&mut self, id: u16, len: usize) -> bool {
+        self.room() > ROOM_FOR_OTHERS && self.admits(id, len)
+    }
+
+    fn admits(&mut self, id: u16, len: usize) -> bool {
+        !C::BUS_SHARE || self.budget.admits(id, len, self.now)
+    }
+
+    fn spend(&mut self, len: usize) -> bool {
+        if C::BUS_SHARE {
+            self.budget.spend(len);
+        }
+        true
+    }
+
+    fn room(&self) -> usize {
+        if self.is_open { self.out.room() } else { 0 }
+    }
+}
+
+/// Free places that PDOs leave in the queue: for a heartbeat, an EMCY, an SDO response and an LSS response.
+const ROOM_FOR_SERVICES: usize = 4;
+
+/// Free places that events leave in the queue. The bus may be busy for minutes, but events can wait in the application.
+/// A block upload, which leaves fewer places, continues beside them.
+const ROOM_FOR_OTHERS: usize = 12;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,9 +209,9 @@ mod tests {
         let mut budget = Budget::new(kbit);
         let mut frames = [0; 8];
         for ms in 0..10_000 {
-            budget.begin(Tick(ms * 1000), || false);
+            budget.begin(Tick::since_epoch(ms * 1000), || false);
             for (id, count) in (0x181..).zip(&mut frames) {
-                if budget.admits(id, 8, Tick(ms * 1000)) {
+                if budget.admits(id, 8, Tick::since_epoch(ms * 1000)) {
                     budget.spend(8);
                     *count += 1;
                 }
@@ -180,9 +249,9 @@ mod tests {
             let span = 135_000 * 5 / 2 / u32::from(kbit);
             for ms in 0..10_000 {
                 let now = ms * 1000;
-                budget.begin(Tick(now), || now < free_at);
+                budget.begin(Tick::since_epoch(now), || now < free_at);
                 for id in 0x181..0x189 {
-                    if budget.admits(id, 8, Tick(now)) {
+                    if budget.admits(id, 8, Tick::since_epoch(now)) {
                         budget.spend(8);
                         free_at = free_at.max(now) + span;
                     }
@@ -199,22 +268,22 @@ mod tests {
     #[test]
     fn an_instant_before_the_last_refill_earns_nothing() {
         let mut budget = Budget::new(10);
-        budget.begin(Tick(1_000_000), || false);
-        while budget.admits(0x181, 8, Tick(1_000_000)) {
+        budget.begin(Tick::since_epoch(1_000_000), || false);
+        while budget.admits(0x181, 8, Tick::since_epoch(1_000_000)) {
             budget.spend(8);
         }
-        budget.begin(Tick(999_999), || false);
-        assert!(!budget.admits(0x181, 8, Tick(999_999)));
+        budget.begin(Tick::since_epoch(999_999), || false);
+        assert!(!budget.admits(0x181, 8, Tick::since_epoch(999_999)));
     }
 
     #[test]
     fn a_claim_ends_when_its_pdo_does_not_wait_any_more() {
         let mut budget = Budget::new(10);
-        while budget.admits(0x181, 8, Tick(0)) {
+        while budget.admits(0x181, 8, Tick::PAST) {
             budget.spend(8);
         }
-        assert!(!budget.admits(0x281, 8, Tick(2_000)), "181h has the claim");
-        budget.begin(Tick(40_000), || false);
-        assert!(budget.admits(0x281, 8, Tick(40_000)), "the claim of 181h has ended");
+        assert!(!budget.admits(0x281, 8, Tick::since_epoch(2_000)), "181h has the claim");
+        budget.begin(Tick::since_epoch(40_000), || false);
+        assert!(budget.admits(0x281, 8, Tick::since_epoch(40_000)), "the claim of 181h has ended");
     }
 }

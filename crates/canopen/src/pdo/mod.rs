@@ -1,8 +1,6 @@
 //! PDO: process data, mapped from and to the dictionary (CiA 301, 7.2.2).
 
 mod budget;
-mod context;
-mod links;
 mod mapping;
 mod multiplexed;
 mod rpdo;
@@ -10,10 +8,8 @@ mod scanner;
 mod tpdo;
 
 pub use crate::dictionary::{Addressing, MappedObject, Transmission};
-pub(crate) use budget::Budget;
-pub(crate) use context::ProcessContext;
-pub(crate) use links::{Chain, Links};
-pub(crate) use mapping::{Content, Layout, locate};
+pub(crate) use budget::{Budget, Choices, ProcessContext};
+pub(crate) use mapping::{Chain, Content, Layout, Links, locate};
 pub use multiplexed::{Address, Mpdo};
 pub(crate) use rpdo::{Reception, Rpdo, RpdoFault, RpdoSettings};
 pub(crate) use scanner::{Scanner, ScannerSettings, Watched};

@@ -123,7 +123,9 @@ impl Rpdo {
     /// Takes new settings and discards the state of the old ones.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
         self.is_valid = settings.is_some();
-        self.settings = settings.unwrap_or(RpdoSettings::UNUSED);
+        if let Some(settings) = settings {
+            self.settings = settings;
+        }
         self.stop();
     }
 
@@ -213,6 +215,11 @@ impl Rpdo {
     /// Whether any fault is active.
     pub(crate) fn has_faults(&self) -> bool {
         self.faults != 0
+    }
+
+    /// Whether it has not arrived in time.
+    pub(crate) fn is_missing(&self) -> bool {
+        self.faults & 1 << RpdoFault::Deadline as u8 != 0
     }
 
     /// When the next frame is missing.

@@ -5,7 +5,7 @@
 //! triggers the transmission, always of all objects. Without one, each changed object is sent. Entering Operational
 //! sends all objects in both cases.
 
-use super::{Address, Layout, Mpdo, ProcessContext};
+use super::{Address, Choices, Layout, Mpdo, ProcessContext};
 use crate::array::Array;
 use crate::dictionary::{Addressing, Field};
 use crate::sdo::Multiplexer;
@@ -110,7 +110,7 @@ impl<L: Array<Watched>> Scanner<L> {
             is_pending: false,
             event_due: Tick::NEVER,
             sent: Tick::NEVER,
-            inhibited_until: Tick(0),
+            inhibited_until: Tick::PAST,
         }
     }
 
@@ -196,7 +196,7 @@ impl<L: Array<Watched>> Scanner<L> {
 
     fn inhibit_end(&self) -> Tick {
         match (self.sent, &self.settings) {
-            (Tick::NEVER, _) | (_, None) => Tick(0),
+            (Tick::NEVER, _) | (_, None) => Tick::PAST,
             (sent, Some(settings)) => sent.plus(Span::from_inhibit(settings.inhibit)),
         }
     }
@@ -207,7 +207,11 @@ impl<L: Array<Watched>> Scanner<L> {
     }
 
     /// Sends the objects whose value has changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(crate) fn on_change(
+        &mut self,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit, impl Choices>,
+    ) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
             for watched in self.watched.iter_mut().filter(|watched| watched.is_selected) {
@@ -219,7 +223,11 @@ impl<L: Array<Watched>> Scanner<L> {
     }
 
     /// Sends the objects that wait, one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(crate) fn poll(
+        &mut self,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit, impl Choices>,
+    ) {
         let Some(settings) = self.settings else { return };
         let elapsed = context.now >= self.event_due;
         if elapsed {

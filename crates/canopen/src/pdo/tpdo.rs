@@ -7,7 +7,7 @@
 //! A TPDO that sends events is sent when the application has an event, and never because a value has changed. The
 //! inhibit time and the event timer determine when the application is asked for its waiting events.
 
-use super::{Layout, Links, ProcessContext};
+use super::{Choices, Layout, Links, ProcessContext};
 use crate::dictionary::Transmission;
 use crate::sync::Sync;
 use crate::transmit::RETRY;
@@ -47,9 +47,9 @@ impl Settings {
     /// The end of the inhibit time after a transmission. The types 254 and 255 have an inhibit time (CiA 301, 7.5.2.35).
     fn inhibit_end(&self, sent: Tick) -> Tick {
         match sent {
-            Tick::NEVER => Tick(0),
+            Tick::NEVER => Tick::PAST,
             _ if self.transmission.is_event_driven() => sent.plus(Span::from_inhibit(self.inhibit)),
-            _ => Tick(0),
+            _ => Tick::PAST,
         }
     }
 
@@ -113,7 +113,7 @@ impl Tpdo {
             data: None,
             event_due: Tick::NEVER,
             sent: Tick::NEVER,
-            inhibited_until: Tick(0),
+            inhibited_until: Tick::NEVER,
             events: Events::NONE,
         }
     }
@@ -128,7 +128,10 @@ impl Tpdo {
     /// Takes new settings and discards the state of the old ones.
     pub(crate) fn configure(&mut self, settings: Option<Settings>) {
         self.is_valid = settings.is_some();
-        self.settings = settings.unwrap_or(Settings::UNUSED);
+        match settings {
+            Some(settings) => self.settings = settings,
+            None => self.settings.events_of = None,
+        }
         self.stop();
     }
 
@@ -161,7 +164,10 @@ impl Tpdo {
     }
 
     /// For a TPDO that sends events: its number, if the application may be asked for an event now.
-    pub(crate) fn asks_for_event(&mut self, context: &mut ProcessContext<'_, impl Transmit>) -> Option<u16> {
+    pub(crate) fn asks_for_event<C: Choices>(
+        &mut self,
+        context: &mut ProcessContext<'_, impl Transmit, C>,
+    ) -> Option<u16> {
         let number = self.events_of()?;
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
@@ -176,11 +182,11 @@ impl Tpdo {
     }
 
     /// Handles the answer of the application. If `is_event`, the event is in the image.
-    pub(crate) fn take_event(
+    pub(crate) fn take_event<C: Choices>(
         &mut self,
         is_event: bool,
         image: &[u8],
-        context: &mut ProcessContext<'_, impl Transmit>,
+        context: &mut ProcessContext<'_, impl Transmit, C>,
     ) {
         if is_event || self.events.is_silent && self.data.is_some() {
             self.send(image, context);
@@ -216,11 +222,11 @@ impl Tpdo {
     }
 
     /// Sends or samples the values with a SYNC, depending on the transmission type.
-    pub(crate) fn on_sync(
+    pub(crate) fn on_sync<C: Choices>(
         &mut self,
         sync: Sync,
         image: &[u8],
-        context: &mut ProcessContext<'_, impl Transmit>,
+        context: &mut ProcessContext<'_, impl Transmit, C>,
     ) {
         let transmission = self.settings.transmission;
         match transmission {
@@ -256,7 +262,11 @@ impl Tpdo {
     /// Answers a remote frame; the types 254 and 255 answer when the inhibit time is over. TPDOs of the synchronous types
     /// 0 to 240 are sent by SYNC only and do not answer.
     #[inline(never)]
-    pub(crate) fn on_remote(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(crate) fn on_remote<C: Choices>(
+        &mut self,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit, C>,
+    ) {
         let settings = &self.settings;
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
@@ -264,7 +274,7 @@ impl Tpdo {
                 context.send_pdo(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             // Before the first event, there is nothing to send.
-            _ if settings.events_of.is_some() && self.data.is_none() => (),
+            _ if C::SENDS_EVENTS && settings.events_of.is_some() && self.data.is_none() => (),
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
                 self.pending = true;
                 self.poll(image, context);
@@ -281,11 +291,11 @@ impl Tpdo {
     /// Sends the values if a mapped value has changed. `is_quiet`: whether a change at this place of the image is too
     /// small to be sent.
     #[inline]
-    pub(crate) fn on_change(
+    pub(crate) fn on_change<C: Choices>(
         &mut self,
         image: &[u8],
         is_quiet: impl Fn(usize) -> bool,
-        context: &mut ProcessContext<'_, impl Transmit>,
+        context: &mut ProcessContext<'_, impl Transmit, C>,
     ) {
         if self.settings.sends_on_change() && self.has_changed(image) && self.is_worth(image, is_quiet) {
             self.pending = true;
@@ -314,9 +324,13 @@ impl Tpdo {
     }
 
     /// Sends the TPDO if a transmission is due.
-    pub(crate) fn poll(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    pub(crate) fn poll<C: Choices>(
+        &mut self,
+        image: &[u8],
+        context: &mut ProcessContext<'_, impl Transmit, C>,
+    ) {
         let elapsed = context.now >= self.event_due;
-        let sends_events = self.events_of().is_some();
+        let sends_events = C::SENDS_EVENTS && self.events_of().is_some();
         if elapsed || sends_events && self.event_due == Tick::NEVER {
             self.event_due = self.event_due.following(self.settings.event, context.now);
         }
@@ -331,11 +345,11 @@ impl Tpdo {
     }
 
     /// Sends the present values. If the queue is full, the values of a later time are sent when there is room.
-    fn send(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit>) {
+    fn send<C: Choices>(&mut self, image: &[u8], context: &mut ProcessContext<'_, impl Transmit, C>) {
         let Settings { id, layout, transmission, .. } = &self.settings;
         let data = layout.gather(image);
         let frame = || Frame::data_frame(*id, layout.len(), data);
-        let sends_events = self.settings.events_of.is_some();
+        let sends_events = C::SENDS_EVENTS && self.settings.events_of.is_some();
         let is_sent = if sends_events { context.send_event(frame()) } else { context.send_pdo(frame()) };
         self.pending = !is_sent;
         if is_sent {

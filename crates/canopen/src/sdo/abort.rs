@@ -107,39 +107,46 @@ impl Abort {
 
     /// The code on the wire.
     #[must_use]
+    #[allow(clippy::indexing_slicing, reason = "the table has all reasons")]
     pub const fn code(self) -> u32 {
+        let digits = DIGITS[self as usize] as u32;
+        (digits & 0xF000) << 12 | (digits & 0x0F00) << 8 | digits & 0xFF
+    }
+
+    /// The code without the zeros that all codes have: 6A23h for 060A 0023h.
+    const fn digits(self) -> u16 {
         match self {
-            Abort::Toggle => 0x0503_0000,
-            Abort::TimeOut => 0x0504_0000,
-            Abort::Command => 0x0504_0001,
-            Abort::BlockSize => 0x0504_0002,
-            Abort::Sequence => 0x0504_0003,
-            Abort::Crc => 0x0504_0004,
-            Abort::OutOfMemory => 0x0504_0005,
-            Abort::Access => 0x0601_0000,
-            Abort::WriteOnly => 0x0601_0001,
-            Abort::ReadOnly => 0x0601_0002,
-            Abort::NoObject => 0x0602_0000,
-            Abort::NotMappable => 0x0604_0041,
-            Abort::PdoLength => 0x0604_0042,
-            Abort::Parameter => 0x0604_0043,
-            Abort::Incompatible => 0x0604_0047,
-            Abort::Hardware => 0x0606_0000,
-            Abort::Length => 0x0607_0010,
-            Abort::TooLong => 0x0607_0012,
-            Abort::TooShort => 0x0607_0013,
-            Abort::NoSubIndex => 0x0609_0011,
-            Abort::InvalidValue => 0x0609_0030,
-            Abort::ValueTooHigh => 0x0609_0031,
-            Abort::ValueTooLow => 0x0609_0032,
-            Abort::LimitsReversed => 0x0609_0036,
-            Abort::NoConnection => 0x060A_0023,
-            Abort::General => 0x0800_0000,
-            Abort::NotStored => 0x0800_0020,
-            Abort::LocalControl => 0x0800_0021,
-            Abort::DeviceState => 0x0800_0022,
-            Abort::NoDictionary => 0x0800_0023,
-            Abort::NoData => 0x0800_0024,
+            Abort::Toggle => 0x5300,
+            Abort::TimeOut => 0x5400,
+            Abort::Command => 0x5401,
+            Abort::BlockSize => 0x5402,
+            Abort::Sequence => 0x5403,
+            Abort::Crc => 0x5404,
+            Abort::OutOfMemory => 0x5405,
+            Abort::Access => 0x6100,
+            Abort::WriteOnly => 0x6101,
+            Abort::ReadOnly => 0x6102,
+            Abort::NoObject => 0x6200,
+            Abort::NotMappable => 0x6441,
+            Abort::PdoLength => 0x6442,
+            Abort::Parameter => 0x6443,
+            Abort::Incompatible => 0x6447,
+            Abort::Hardware => 0x6600,
+            Abort::Length => 0x6710,
+            Abort::TooLong => 0x6712,
+            Abort::TooShort => 0x6713,
+            Abort::NoSubIndex => 0x6911,
+            Abort::InvalidValue => 0x6930,
+            Abort::ValueTooHigh => 0x6931,
+            Abort::ValueTooLow => 0x6932,
+            Abort::LimitsReversed => 0x6936,
+            Abort::NoConnection => 0x6A23,
+            Abort::General => 0x8000,
+            Abort::NotStored => 0x8020,
+            Abort::LocalControl => 0x8021,
+            Abort::DeviceState => 0x8022,
+            Abort::NoDictionary => 0x8023,
+            Abort::NoData => 0x8024,
         }
     }
 
@@ -181,6 +188,17 @@ impl Abort {
         }
     }
 }
+
+/// The digits of all codes, which take half of the flash that the codes would take.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+const DIGITS: [u16; Abort::ALL.len()] = {
+    let (mut digits, mut i) = ([0; Abort::ALL.len()], 0);
+    while i < digits.len() {
+        digits[Abort::ALL[i] as usize] = Abort::ALL[i].digits();
+        i += 1;
+    }
+    digits
+};
 
 /// The meaning and the code.
 impl core::fmt::Display for Abort {

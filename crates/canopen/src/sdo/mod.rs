@@ -8,7 +8,6 @@ mod block;
 mod block_download;
 mod block_upload;
 mod bytes;
-mod channel;
 mod cob_id;
 pub(crate) mod crc;
 mod objects;
@@ -20,35 +19,11 @@ mod server;
 pub use abort::Abort;
 pub use block::{BlockEnd, BlockSegment, BlockSize};
 pub use bytes::Bytes;
-pub use channel::Channel;
 pub use objects::Part;
 pub(crate) use objects::{BUFFER, Objects, Writable};
-pub use request::{Initiate, Request};
+pub use request::{Initiate, Multiplexer, Request};
 pub use response::Response;
-use server::Server;
-
-/// The object of a transfer: index and sub-index, bytes 1 to 3 of the frames that initiate a transfer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Multiplexer {
-    /// Index.
-    pub index: u16,
-    /// Sub-index.
-    pub sub: u8,
-}
-
-impl Multiplexer {
-    pub(crate) const fn parse(frame: &[u8; 8]) -> Multiplexer {
-        Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
-    }
-
-    /// The data of a frame: command specifier, this multiplexer and four bytes.
-    pub(crate) const fn frame(self, command: u8, data: [u8; 4]) -> [u8; 8] {
-        let head = command as u32 | (self.index as u32) << 8 | (self.sub as u32) << 24;
-        let [command, low, high, sub] = head.to_le_bytes();
-        [command, low, high, sub, data[0], data[1], data[2], data[3]]
-    }
-}
+pub use server::Channel;
 
 /// The bit of the command byte that alternates from segment to segment.
 const TOGGLE: u8 = 0x10;

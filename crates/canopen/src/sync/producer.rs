@@ -36,7 +36,7 @@ impl Producer {
     /// The next SYNC is due at once, with the counter 1.
     pub(crate) fn restart(&mut self) {
         self.counter = 0;
-        self.due = if self.period == 0 { Tick::NEVER } else { Tick(0) };
+        self.due = if self.period == 0 { Tick::NEVER } else { Tick::PAST };
     }
 
     /// No SYNC is produced in this NMT state.
@@ -64,7 +64,7 @@ impl Producer {
     /// The SYNC has been sent. The next one is due a period after this one was, so delays do not add up.
     pub(crate) fn sent(&mut self, now: Tick) {
         self.counter = self.next_counter();
-        let first = self.due == Tick(0);
+        let first = self.due == Tick::PAST;
         let next = if first { now } else { self.due }.plus_long(self.period);
         self.due = if next > now { next } else { now.plus_long(self.period) };
     }

@@ -59,6 +59,8 @@ pub(crate) struct Numbers {
 }
 
 impl Application for Numbers {
+    const SENDS_EVENTS: bool = true;
+
     const CONDITIONS: &'static [Condition] = &[
         Condition::new(0x5006),
         Condition::new(0x8002),

@@ -55,6 +55,8 @@ struct Choice {
 }
 
 impl Application for Choice {
+    const SENDS_EVENTS: bool = true;
+
     fn write(&mut self, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         self.chosen = bytes != [0];
         Ok(())

@@ -27,6 +27,8 @@ const COB_ID: Field = DICTIONARY.field(0x1800, 1);
 struct Switch(Cell<u32>);
 
 impl Application for Switch {
+    const SENDS_EVENTS: bool = true;
+
     fn sends_events(&self, _: u16) -> bool {
         self.0.set(self.0.get() + 1);
         false

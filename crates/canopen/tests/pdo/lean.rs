@@ -9,6 +9,13 @@ use crate::bench::{ID, Nothing, Sent, download};
 const INPUT: Object =
     Object::new(0x6000, 0, "Input", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
 
+/// A TPDO that does not answer remote frames, and an RPDO with the CAN-ID 202h.
+const SILENT_ROWS: &[Object] =
+    canopen::rows!(objects::without_remote(objects::tpdo(1, &[INPUT])), objects::rpdo(1, &[OUTPUT]), [INPUT, OUTPUT]);
+static SILENT: Dictionary = canopen::dictionary!(SILENT_ROWS);
+const OUTPUT: Object =
+    Object::new(0x6100, 0, "Output", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo);
+
 const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(0), objects::error_register(), objects::heartbeat_producer(0)],
     objects::error_field::<3>(),
@@ -54,14 +61,44 @@ fn operational<A: Application>(application: A) -> (Lean<A>, Sent) {
 
 #[test]
 fn the_rows_decide_on_the_services() {
-    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (Services::FAULTS, 0));
-    let multiplexed =
-        [Services::FAULTS, Services::SYNC, Services::EMCY, Services::STORE, Services::MULTIPLEXED_RPDO];
+    let expected = Services::FAULTS.with(Services::REMOTE);
+    assert_eq!((Services::of(ROWS), Sizes::of(ROWS).scanned), (expected, 0));
+    let multiplexed = [expected, Services::SYNC, Services::EMCY, Services::STORE, Services::MULTIPLEXED_RPDO];
     let expected = multiplexed.into_iter().fold(Services::NONE, Services::with);
     assert_eq!((Services::of(MULTIPLEXED_ROWS), Sizes::of(MULTIPLEXED_ROWS).scanned), (expected, 2));
     let other = [Services::of(&[objects::start_up()]), Services::of(&[objects::program_control()[1]])];
     let expected = [Services::SELF_START, Services::PROGRAM_CONTROL].map(|own| own.with(Services::FAULTS));
     assert_eq!(other, expected);
+}
+
+#[test]
+fn without_remote_frames_none_is_answered_and_no_client_can_allow_them() {
+    assert_eq!(Services::of(SILENT_ROWS), Services::FAULTS);
+    let asked = objects::with(objects::without_remote(objects::tpdo(1, &[INPUT])), 2, 253);
+    assert!(Services::of(&asked).contains(Services::REMOTE), "type 253 needs them");
+    assert!(Services::of(&objects::tpdo(5, &[INPUT])).contains(Services::REMOTE), "also while it is not valid");
+
+    type Node = canopen::device!(Nothing, SILENT_ROWS);
+    let (mut device, mut sent): (Node, _) = (Device::new(&SILENT, NodeId::new(ID), Nothing), Sent::default());
+    let _ = device.start(Instant(0), &mut sent);
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(1), &mut sent);
+    let _ = device.poll(Instant(2), &mut sent);
+    sent.0.clear();
+    let (tpdo, rpdo) = (0x180 + u16::from(ID), 0x200 + u16::from(ID));
+    for id in [tpdo, rpdo] {
+        let _ = device.on_frame(&Frame::remote(id, 1).unwrap(), Instant(3), &mut sent);
+    }
+    assert_eq!(sent.0, [], "no answer, and no EMCY about a short RPDO");
+    assert!(!device.process_ids().any(|own| own.get() == tpdo));
+
+    let mut write = |sub, value: &[u8]| download(&mut device, (0x1800, sub), value, Instant(4));
+    assert_eq!(write(1, &u32::from(tpdo).to_le_bytes()), Err(0x0609_0030), "valid and allowed");
+    assert_eq!(write(1, &(0x8000_0000 | u32::from(tpdo)).to_le_bytes()), Ok(()), "switched off");
+    assert_eq!(write(1, &u32::from(tpdo).to_le_bytes()), Err(0x0609_0030), "valid again, and allowed");
+    for kind in [252, 253] {
+        assert_eq!(write(2, &[kind]), Err(0x0609_0030), "type {kind}");
+    }
+    assert_eq!(write(1, &(0x4000_0000 | u32::from(tpdo)).to_le_bytes()), Ok(()), "as it was");
 }
 
 #[test]

@@ -18,5 +18,7 @@ pub(super) const fn shifted<const N: usize>(rows: &[Object]) -> [Object; N] {
 /// One shifted row. A unit that names an index is shifted too.
 const fn row(row: &Object) -> Object {
     let unit = if matches!(row.unit.as_bytes(), b"6131h") { "6931h" } else { row.unit };
-    Object { index: row.index + SHIFT, unit, ..*row }
+    let mut shifted = *row;
+    (shifted.index, shifted.unit) = (row.index + SHIFT, unit);
+    shifted
 }

@@ -67,13 +67,22 @@ const fn fact(sub: u8, name: &'static str, kind: Type) -> Object {
 /// 2004h: facts about the board and its programs, for the master of an update. Programs are named by their identification,
 /// as in 1F56h; 0 is none.
 pub const PROGRAM_STATE_ROWS: &[Object] = &[
-    Object::highest(PROGRAM_STATE, 5, "Program state"),
-    fact(1, "Board", Type::Unsigned32).value(product::BOARD as i64),
+    Object::highest(PROGRAM_STATE, 7, "Program state"),
+    fact(1, "Board", Type::Unsigned32).value(crate::product::BOARD as i64),
     fact(2, "Security counter", Type::Unsigned32),
     fact(3, "Key generation", Type::Unsigned8),
     fact(4, "Downloaded program", Type::Unsigned32),
     fact(5, "Kept program", Type::Unsigned32),
+    fact(6, "Sector erases", Type::Unsigned16),
+    fact(7, "Clears allowed", Type::Unsigned8),
 ];
+
+/// Index of the log of updates.
+pub const UPDATE_LOG: u16 = 0x2006;
+
+/// 2006h: the last sixteen events of updates. docs/update.md describes an event.
+pub const UPDATE_LOG_ROW: Object =
+    Object::new(UPDATE_LOG, 0, "Update log", Type::Domain, Access::ReadOnly);
 
 /// Index of the object that counts lost events.
 pub const LOST_EVENTS: u16 = 0x2001;

@@ -78,6 +78,8 @@ pub struct Transmitter {
     pressure: Channel,
     temperature: Channel,
     conditions: Conditions,
+    /// The pressure comes from a faulty sensor, or its filter contains such a sample.
+    is_pressure_held: bool,
     /// No fault is present, and no filter contains a sample taken during a fault.
     is_well: bool,
     /// Samples until the next check for a sensor break.
@@ -95,6 +97,7 @@ impl Transmitter {
             pressure: Channel::new(&parameters.pressure),
             temperature: Channel::new(&parameters.temperature),
             conditions: Conditions::default(),
+            is_pressure_held: false,
             is_well: true,
             until_check: 0,
         }
@@ -112,7 +115,7 @@ impl Transmitter {
         let kelvin = self.calibration.temperature.temperature(raw, self.chip);
         let conditions = self.check(raw, ratio, kelvin.is_none());
         let pressure = self.calibration.pressure.pressure(ratio, kelvin);
-        let is_valid = !conditions.sensor_break && !conditions.pressure_rail;
+        let is_valid = !conditions.sensor_break && !self.is_pressure_held;
         snapshot.pressure = self.pressure.sample(pressure, is_valid);
         if kelvin.is_none() {
             snapshot.pressure.status |= self.calibration.pressure.uncompensated();
@@ -122,13 +125,15 @@ impl Transmitter {
         snapshot.conditions = conditions;
     }
 
-    /// The faults of the sensors. A fault lasts until the filter behind the sensor is full of good samples.
+    /// The faults of the sensors. A fault lasts until the filter behind the sensor is full of good samples. A ratio that no
+    /// intact sensor gives makes the value invalid at once; the break is reported with the next check.
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
         let is_check = self.until_check == 0;
         self.until_check = if is_check { SAMPLES_PER_SECOND } else { self.until_check } - 1;
         let is_rail = raw.is_rail(raw.pressure);
-        if is_check || !self.is_well || is_rail || has_no_temperature {
-            self.judge(is_check, ratio, is_rail, has_no_temperature);
+        let is_break = self.calibration.pressure.is_break(ratio);
+        if is_check || !self.is_well || is_rail || is_break || has_no_temperature {
+            self.judge(is_check, is_break, is_rail, has_no_temperature);
         }
         self.conditions
     }
@@ -136,8 +141,7 @@ impl Transmitter {
     // Most samples are good ones, and their processing time is short.
     #[cold]
     #[inline(never)]
-    fn judge(&mut self, is_check: bool, ratio: f32, is_rail: bool, has_no_temperature: bool) {
-        let is_break = self.calibration.pressure.is_break(ratio);
+    fn judge(&mut self, is_check: bool, is_break: bool, is_rail: bool, has_no_temperature: bool) {
         let pressure_holds = self.pressure.is_faulty(is_break || is_rail);
         let temperature_holds = self.temperature.is_faulty(has_no_temperature);
         let before = self.conditions;
@@ -146,6 +150,7 @@ impl Transmitter {
         }
         self.conditions.pressure_rail = is_rail || before.pressure_rail && pressure_holds;
         self.conditions.temperature_rail = has_no_temperature || before.temperature_rail && temperature_holds;
+        self.is_pressure_held = pressure_holds;
         self.is_well = self.conditions == Conditions::default() && !pressure_holds && !temperature_holds;
     }
 }
@@ -199,11 +204,12 @@ mod tests {
     }
 
     #[test]
-    fn a_break_is_looked_for_once_a_second() {
+    fn a_break_is_invalid_at_once_and_reported_once_a_second() {
         let mut transmitter = Transmitter::new(CHIP, &Parameters::default());
         transmitter.sample(&GOOD);
         for _ in 1..1000 {
-            assert!(!transmitter.sample(&OPEN).conditions.sensor_break);
+            let snapshot = transmitter.sample(&OPEN);
+            assert!(!snapshot.conditions.sensor_break && snapshot.pressure.status & STATUS_INVALID != 0);
         }
         let found = transmitter.sample(&OPEN);
         assert!(found.conditions.sensor_break && found.pressure.status & STATUS_INVALID != 0);
@@ -211,6 +217,24 @@ mod tests {
             assert!(transmitter.sample(&GOOD).conditions.sensor_break);
         }
         assert!(!transmitter.sample(&GOOD).conditions.sensor_break);
+    }
+
+    /// A transducer shorted to its supply is above its limits and below the rail of the converter.
+    #[test]
+    fn a_break_that_ends_before_the_check_is_invalid_too() {
+        let shorted = RawSample { pressure: 16 * 2000, ..GOOD };
+        let mut transmitter = Transmitter::new(CHIP, &Parameters::default());
+        transmitter.sample(&GOOD);
+        let status = [shorted, GOOD, GOOD].map(|raw| {
+            let snapshot = transmitter.sample(&raw);
+            assert_eq!(snapshot.conditions, Conditions::default());
+            snapshot.pressure.status
+        });
+        assert_eq!(
+            status,
+            [STATUS_INVALID | STATUS_ABOVE, STATUS_INVALID, 0],
+            "the sample after a fault settles"
+        );
     }
 
     /// The first valid value after a fault is right, whatever the last faulty sample contains.

@@ -9,14 +9,16 @@ use update::{
     Target, Trial, Updater, Version, boot,
 };
 
-/// Sectors of the mock: security counter and key generation; application in two; staging in two; the kept image in two.
-pub(crate) const SECTORS: [usize; 7] = [1536, 1024, 2048, 2048, 2048, 2048, 2048];
+/// Sectors of the mock: security counter and key generation; application in two; staging in two; the kept image in two;
+/// the count of erases.
+pub(crate) const SECTORS: [usize; 8] = [1536, 1024, 2048, 2048, 2048, 2048, 2048, 2048];
 pub(crate) const APPLICATION: usize = 1536;
 pub(crate) const STAGING: usize = 1536 + 3072;
 const SECURITY_AREA: Area = Area::new(0, &[1536]);
 const APPLICATION_AREA: Area = Area::new(1536, &[1024, 2048]);
 const STAGING_AREA: Area = Area::new(1536 + 3072, &[2048, 2048]);
 const KEPT_AREA: Area = Area::new(1536 + 3072 + 4096, &[2048, 2048]);
+const WEAR_AREA: Area = Area::new(1536 + 3072 + 4096 + 4096, &[2048]);
 
 pub(crate) const BOARD: u32 = 0x0001_8271;
 pub(crate) const REVISION: u8 = 2;
@@ -44,7 +46,7 @@ pub(crate) fn certificate(generation: u32, counter: u32, key: u8, by: u8) -> Cer
 }
 
 pub(crate) fn target() -> Target {
-    let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA, KEPT_AREA).unwrap();
+    let layout = Layout::new(SECURITY_AREA, WEAR_AREA, APPLICATION_AREA, STAGING_AREA, KEPT_AREA).unwrap();
     Target { layout, board: BOARD, hardware: REVISION, keys: &PUBLIC_KEYS }
 }
 

@@ -5,6 +5,7 @@ mod commit_cuts;
 mod corrupted;
 mod header;
 mod key_ranks;
+mod log;
 mod ordinary;
 mod power_cuts;
 mod sequences;

@@ -8,7 +8,7 @@ use crate::bench::{
 use update::key::KeyList;
 use update::mock::{MockFlash, Weak};
 use update::{
-    Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial,
+    Clears, Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial,
     Updater, boot,
 };
 
@@ -308,9 +308,9 @@ fn cut_everywhere(flash: &MockFlash, act: impl Fn(&mut MockFlash) -> bool, check
 #[test]
 fn the_programs_in_the_flash_are_known_through_return_and_confirmation() {
     let mut flash = flash_with(&image_a(), 1);
-    let known = |flash: &mut MockFlash| Programs::read(flash, &target().layout);
+    let known = |flash: &mut MockFlash| Programs::read(flash, &target().layout, Clears::default());
     let [a, b] = [image_a(), image_b()].map(|image| image.header.code_crc());
-    assert_eq!(known(&mut flash), Programs { staged: a, ..Programs::default() });
+    assert_eq!(known(&mut flash), Programs { staged: a, erases: 2, clears_allowed: 50, ..Programs::default() });
     update(&mut flash, &image_b().bytes()).unwrap();
     assert_eq!((known(&mut flash).staged, known(&mut flash).kept), (b, a));
     withdraw(&mut flash);
@@ -323,7 +323,9 @@ fn the_programs_in_the_flash_are_known_through_return_and_confirmation() {
     assert_eq!((known(&mut flash).counter, known(&mut flash).generation), (0, 0), "on trial");
     confirm(&mut flash);
     start(&mut flash);
-    let expected = Programs { counter: 7, generation: 3, staged: next.header.code_crc(), kept: a };
+    let staged = next.header.code_crc();
+    let expected =
+        Programs { counter: 7, generation: 3, staged, kept: a, erases: 2 + 3 + 1 + 3, clears_allowed: 50 };
     assert_eq!(known(&mut flash), expected);
 }
 

@@ -3,11 +3,6 @@
 mod bxcan;
 mod controller;
 mod dual;
-mod fifo;
-mod filter;
-mod mailbox;
-mod status;
-mod transmit;
 
 pub use bxcan::{BxCan, Lines, Reception};
 pub use dual::DualCan;

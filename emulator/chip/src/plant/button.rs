@@ -5,8 +5,7 @@ use std::str::FromStr;
 use canbus::Time;
 use thiserror::Error;
 
-/// Number of buttons on the board.
-pub const BUTTONS: usize = 2;
+use crate::board::BUTTONS;
 
 /// The time for which a contact bounces after a press or release, and the period of the bouncing.
 const BOUNCES_FOR: Time = Time::from_micros(3000);

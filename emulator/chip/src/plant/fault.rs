@@ -24,6 +24,12 @@ pub enum FaultKind {
     OpenSsi,
     /// The absolute encoder sends a position that is half a revolution off.
     WrongCode,
+    /// The absolute encoder sets its error bit.
+    SsiError,
+    /// The parity bit of the absolute encoder is wrong.
+    SsiParity,
+    /// The incremental encoder bounces between two steps.
+    Bounce,
     /// No battery, or an empty one, at VBAT: a loss of the main supply is also a loss of the backup domain's supply.
     BatteryEmpty,
     /// No battery, and a main supply that returns soon: the backup SRAM has lost some of its bits.
@@ -32,7 +38,7 @@ pub enum FaultKind {
     NoCrystal,
 }
 
-const NAMES: [(&str, FaultKind); 11] = [
+const NAMES: [(&str, FaultKind); 14] = [
     ("open-sensor", FaultKind::OpenSensor),
     ("rail-high", FaultKind::RailHigh),
     ("rail-low", FaultKind::RailLow),
@@ -41,6 +47,9 @@ const NAMES: [(&str, FaultKind); 11] = [
     ("missing-index", FaultKind::MissingIndex),
     ("open-ssi", FaultKind::OpenSsi),
     ("wrong-code", FaultKind::WrongCode),
+    ("ssi-error", FaultKind::SsiError),
+    ("ssi-parity", FaultKind::SsiParity),
+    ("bounce", FaultKind::Bounce),
     ("battery-empty", FaultKind::BatteryEmpty),
     ("battery-weak", FaultKind::BatteryWeak),
     ("no-crystal", FaultKind::NoCrystal),
@@ -68,6 +77,9 @@ impl FaultKind {
             FaultKind::MissingIndex => "incremental encoder: no index pulse",
             FaultKind::OpenSsi => "absolute encoder: broken data line",
             FaultKind::WrongCode => "absolute encoder: half a revolution off",
+            FaultKind::SsiError => "absolute encoder: error bit, in a format with one",
+            FaultKind::SsiParity => "absolute encoder: wrong parity, in a format with parity",
+            FaultKind::Bounce => "incremental encoder: bounces between two steps",
             FaultKind::BatteryEmpty => "battery: empty",
             FaultKind::BatteryWeak => "battery: too weak, the memory loses bits",
             FaultKind::NoCrystal => "crystal: stopped",

@@ -11,15 +11,16 @@ mod table;
 
 use canbus::Time;
 
-use crate::board::Board;
+use crate::board::{BUTTONS, Board};
+use crate::spi::Reading;
 
 use button::Button;
-pub use button::{BUTTONS, Push, PushError};
+pub use button::{Push, PushError};
 pub use fault::{Fault, FaultError, FaultKind, FaultSwitch};
 pub use front_end::{FrontEnd, Rails};
 pub use shaft::Motion;
-use shaft::Shaft;
 pub(crate) use shaft::first_change;
+use shaft::{Shaft, phases};
 pub use signal::Signal;
 use signal::Stimulus;
 pub use spec::SpecError;
@@ -27,6 +28,8 @@ pub use table::{Table, TableError};
 
 /// The supply of the chip in volts.
 const SUPPLY: f64 = 3.3;
+/// The time between two bounces of the incremental encoder, longer than the filter of the timer's inputs.
+const BOUNCE: Time = Time::from_micros(20);
 
 /// The quantities that the sensors measure, the supply, and the faults.
 #[derive(Clone, Debug)]
@@ -216,12 +219,17 @@ impl Plant {
 
     /// The incremental encoder's position in quarter periods.
     pub(crate) fn quarter(&self, now: Time) -> i64 {
-        self.shaft.quarter(now)
+        self.shaft.quarter(now) + i64::from(self.bounces(now))
+    }
+
+    /// Whether the incremental encoder is one step ahead, every other time.
+    fn bounces(&self, now: Time) -> bool {
+        self.has(FaultKind::Bounce, now) && !(now.0 / BOUNCE.0).is_multiple_of(2)
     }
 
     /// Levels of the encoder's A and B.
     pub(crate) fn phases(&self, now: Time) -> (bool, bool) {
-        self.shaft.phases(now)
+        phases(self.quarter(now))
     }
 
     /// Level of the encoder's index.
@@ -230,10 +238,14 @@ impl Plant {
         started != ended && !self.has(FaultKind::MissingIndex, now)
     }
 
-    /// The position that the absolute encoder sends, in revolutions; `None` when its data line is broken.
-    pub(crate) fn absolute(&self, now: Time) -> Option<f64> {
+    /// What the absolute encoder sends; `None` when its data line is broken.
+    pub(crate) fn absolute(&self, now: Time) -> Option<Reading> {
         let half_off = if self.has(FaultKind::WrongCode, now) { 0.5 } else { 0.0 };
-        (!self.has(FaultKind::OpenSsi, now)).then(|| self.revolutions(now) + half_off)
+        (!self.has(FaultKind::OpenSsi, now)).then(|| Reading {
+            revolutions: self.revolutions(now) + half_off,
+            has_error: self.has(FaultKind::SsiError, now),
+            is_disturbed: self.has(FaultKind::SsiParity, now),
+        })
     }
 
     /// Whether a battery supplies VBAT.

@@ -56,17 +56,17 @@ impl Shaft {
         (self.revolutions(now) * self.quarters as f64).floor() as i64
     }
 
-    /// Levels of A and B.
-    pub(super) fn phases(&self, now: Time) -> (bool, bool) {
-        let quarter = self.quarter(now).rem_euclid(4);
-        (matches!(quarter, 1 | 2), matches!(quarter, 2 | 3))
-    }
-
     /// Counts of the passed edges of the index: at its begin and at its end. The counts differ while the index is high.
     pub(super) fn index_edges(&self, now: Time) -> (i64, i64) {
         let quarter = self.quarter(now);
         (quarter.div_euclid(self.quarters), (quarter - 1).div_euclid(self.quarters))
     }
+}
+
+/// Levels of A and B at a position in quarter periods.
+pub(super) fn phases(quarter: i64) -> (bool, bool) {
+    let quarter = quarter.rem_euclid(4);
+    (matches!(quarter, 1 | 2), matches!(quarter, 2 | 3))
 }
 
 /// The first instant after `from`, up to `until`, at which `key` differs from its value at `from`. The instant is exact
@@ -117,7 +117,7 @@ mod tests {
         let mut shaft = Shaft::new(1);
         let phases = [0.0, 0.25, 0.5, 0.75].map(|angle| {
             shaft.set(Motion::Angle(Signal::Constant(angle)), Time::ZERO);
-            shaft.phases(Time::ZERO)
+            phases(shaft.quarter(Time::ZERO))
         });
         assert_eq!(phases, [(false, false), (true, false), (true, true), (false, true)]);
     }

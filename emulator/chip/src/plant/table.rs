@@ -58,7 +58,7 @@ impl Table {
     /// When the file cannot be read or has another form.
     pub fn open(path: &Path) -> Result<Self, TableError> {
         let name = path.display().to_string();
-        let text = input::read_to_string(path, LARGEST)
+        let text = wire::input::read_to_string(path, LARGEST)
             .map_err(|error| TableError::Read { path: name.clone(), reason: error.to_string() })?;
         Self::parse(&name, &text)
     }

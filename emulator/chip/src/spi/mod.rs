@@ -5,8 +5,8 @@
 mod ssi;
 
 use canbus::Time;
-pub(crate) use ssi::Ssi;
-pub use ssi::SsiFormat;
+pub(crate) use ssi::{Reading, Ssi};
+pub use ssi::{SsiFormat, SsiFormatError};
 
 use crate::clocks::times;
 use crate::register::{bit, field, flag};
@@ -49,8 +49,8 @@ struct Shift {
 /// The device at the other end of the wires.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Far {
-    /// The absolute encoder, at a position in revolutions.
-    Position(f64),
+    /// The absolute encoder.
+    Encoder(Reading),
     /// No device: the line has this level.
     Nothing(bool),
 }
@@ -74,6 +74,11 @@ pub(crate) struct Spi {
 }
 
 impl Spi {
+    /// Connects another absolute encoder.
+    pub(crate) fn set_format(&mut self, format: SsiFormat) {
+        self.device.set_format(format);
+    }
+
     pub(crate) fn new(pclk: Time, device: Ssi) -> Self {
         Self {
             pclk,
@@ -190,8 +195,8 @@ impl Spi {
     pub(crate) fn run(&mut self, now: Time, encoder: impl Fn(Time) -> Far) {
         while let Some(shift) = self.shift.take_if(|shift| shift.end <= now) {
             let word = match encoder(shift.start) {
-                Far::Position(position) => {
-                    self.device.clock_out(self.bits(), shift.start, self.bit_time(), position)
+                Far::Encoder(reading) => {
+                    self.device.clock_out(self.bits(), shift.start, self.bit_time(), reading)
                 }
                 Far::Nothing(level) => u32::from(level) * ((1 << self.bits()) - 1),
             };

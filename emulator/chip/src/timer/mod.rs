@@ -1,7 +1,7 @@
 //! Timers TIM2 to TIM7 and TIM9 to TIM14 (RM0390 sections 17 to 19, RM0090 sections 18 to 20).
 //!
-//! Modelled: up-counting, update and compare events, preloads, TRGO, encoder mode, input capture, and the DMA requests
-//! of TIM3's update and channel 2. Not modelled: output pins, other DMA requests, counting down and the other slave
+//! Modelled: up-counting, update and compare events, preloads, TRGO, encoder mode, input capture, the LSI at channel 4 of
+//! TIM5, and the DMA requests of TIM3's update and channel 2. Not modelled: output pins, other DMA requests, counting down and the other slave
 //! modes. A write that selects one of these is recorded.
 //!
 //! A compare matches when the counter changes to the compare value. A compare value equal to the current count
@@ -30,6 +30,10 @@ const PSC: u32 = 0x28;
 const ARR: u32 = 0x2C;
 const CCR1: u32 = 0x34;
 const CCR4: u32 = 0x40;
+const OR: u32 = 0x50;
+
+/// OR of TIM5: the input of channel 4 is the LSI (RM0390 section 17.4.21, TI4_RMP).
+const OR_LSI: u32 = 1 << 6;
 
 const CR1_CEN: u32 = 0;
 const CR1_UDIS: u32 = 1;
@@ -38,6 +42,8 @@ const CR1_OPM: u32 = 3;
 const CR1_ARPE: u32 = 7;
 /// Unmodelled bits of CR1: DIR and CMS, counting down and up-down.
 const CR1_DOWN: u32 = 0x0070;
+/// Channel 4, as an index.
+pub(crate) const LSI_CHANNEL: usize = 3;
 const SR_UIF: u32 = 0;
 /// Bits of DIER for interrupts: UIE, CC1IE to CC4IE, TIE; the higher bits enable DMA requests.
 const DIER_INTERRUPTS: u32 = 0x005F;
@@ -53,6 +59,8 @@ pub(crate) struct Kind {
     pub(crate) channels: u32,
     /// The modelled DMA requests, as bits of DIER.
     pub(crate) requests: u32,
+    /// Whether the LSI can be at channel 4.
+    pub(crate) sees_lsi: bool,
 }
 
 /// One timer.
@@ -68,6 +76,7 @@ pub(crate) struct Timer {
     sr: u32,
     ccmr: [u32; 2],
     ccer: u32,
+    options: u32,
     /// Position of the encoder at the last update, in quarter periods; `None` without an encoder.
     position: Option<i64>,
     /// Whether the last motion of the encoder was backwards.
@@ -90,6 +99,7 @@ impl Timer {
             sr: 0,
             ccmr: [0; 2],
             ccer: 0,
+            options: 0,
             position: None,
             backwards: false,
             triggered: false,
@@ -117,6 +127,7 @@ impl Timer {
             CCMR1 => Some(self.ccmr[0]),
             CCMR2 => Some(self.ccmr[1]),
             CCER => Some(self.ccer),
+            OR if self.kind.sees_lsi => Some(self.options),
             CCR1..=CCR4 => self.channel_at(offset).map(|channel| self.compare[channel].preload),
             _ => None,
         }
@@ -139,6 +150,7 @@ impl Timer {
             CCMR1 => self.ccmr[0] = value & 0xFFFF,
             CCMR2 => self.ccmr[1] = value & 0xFFFF,
             CCER => self.ccer = value & 0xBBBB,
+            OR if self.kind.sees_lsi => return self.write_options(value),
             CCR1..=CCR4 => return self.write_compare(offset, value),
             _ => return None,
         }
@@ -166,6 +178,16 @@ impl Timer {
     fn write_interrupts(&mut self, value: u32) -> Option<()> {
         self.dier = value & 0x5F5F;
         (value & !(DIER_INTERRUPTS | self.kind.requests) == 0).then_some(())
+    }
+
+    fn write_options(&mut self, value: u32) -> Option<()> {
+        self.options = value & 0xC0;
+        matches!(value, 0 | OR_LSI).then_some(())
+    }
+
+    /// Whether channel 4 captures edges of the LSI.
+    pub(crate) fn measures_lsi(&self) -> bool {
+        self.options == OR_LSI && self.listens(LSI_CHANNEL)
     }
 
     fn write_compare(&mut self, offset: u32, value: u32) -> Option<()> {

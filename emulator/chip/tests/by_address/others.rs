@@ -83,7 +83,7 @@ fn an_edge_on_the_selected_port_is_an_interrupt() {
 
 fn with_ssi() -> Rig {
     let mut rig = Rig::new();
-    let ssi = SsiFormat { single_turn: 13, multi_turn: 12, gray: false };
+    let ssi = SsiFormat { gray: false, ..SsiFormat::default() };
     rig.chip = Stm32f4::new(Variant::F446, Board { ssi, ..Board::default() });
     rig.set(AHB1ENR, 1 << 21 | 1 << 1);
     rig.set(APB1ENR, 1 << 14);

@@ -2,7 +2,7 @@
 
 use canbus::Time;
 use chip::{BusFault, Peripherals};
-use protect::{Error, OptionBytes, ReadOut, Registers, current, program};
+use programmer::protect::{Error, OptionBytes, ReadOut, Registers, current, program};
 
 use crate::flash_interface::{CR, FLASH, LOCK, PG, SR, STRT, WRPERR, X32, erasure};
 use crate::support::Rig;

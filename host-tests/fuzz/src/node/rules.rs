@@ -82,13 +82,13 @@ fn is_emergency(frame: &Frame, board: &mut Board) -> bool {
 
 /// The value of an accepted write reads back.
 fn reads_back(row: &Object, value: [u8; 4], after: Seen, board: &mut Board) {
-    if row.access == Access::WriteOnly || acts(row.rule) {
+    if row.access == Access::WriteOnly || acts(row.rule()) {
         return;
     }
     let size = usize::from(row.kind.size()).min(4);
     let found = read(row, after, board);
     let found = found.as_ref().map(|found| &found[..size]);
-    assert_eq!(found, Some(&value[..size]), "{:04X}h:{} {:?}", row.index, row.sub, row.rule);
+    assert_eq!(found, Some(&value[..size]), "{:04X}h:{} {:?}", row.index, row.sub, row.rule());
 }
 
 /// Whether a write is a command: the object then reads back another value.

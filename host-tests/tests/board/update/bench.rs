@@ -6,8 +6,8 @@ use canopen::sdo::Multiplexer;
 use chip::Stm32f4;
 use emulator::Machine;
 use host_tests::sdo::{Channel, Client, Failure};
-use sign::image::Image;
-use sign::product;
+use programmer::sign::image::Image;
+use programmer::sign::product;
 use sim::port::Adapter;
 use sim::world::World;
 use update::{Description, Status, Version};
@@ -253,5 +253,5 @@ pub(super) fn signed(code: Vec<u8>, change: impl FnOnce(&mut Description)) -> Im
         ..Description::default()
     };
     change(&mut about);
-    Image::sign(about, code, &sign::key::development()).unwrap()
+    Image::sign(about, code, &programmer::sign::key::development()).unwrap()
 }

@@ -4,7 +4,7 @@
 use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
-use sign::image::Image;
+use programmer::sign::image::Image;
 use update::{Description, HEADER_LEN, SIGNED_LEN};
 
 use super::bench::{Bench, signed, version_a};

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use canbus::Time;
 use host_tests::thorough::{either, is_thorough};
-use sign::image::Image;
+use programmer::sign::image::Image;
 
 use super::bench::{Bench, CLEAR, STATUS, signed, version_a, version_b};
 use crate::support::SECOND;

@@ -39,7 +39,7 @@ fn it_has_the_identity_of_the_application_in_every_personality() {
         bench.stop();
         let after = (identity(&mut bench), bench.word(BOARD));
         assert_eq!(after, before, "{personality}: the same node as before");
-        assert_eq!(after.1, product::BOARD);
+        assert_eq!(after.1, profiles::product::BOARD);
         assert_eq!(bench.read(at(0x1001, 0)).unwrap(), [0]);
         assert_eq!(bench.read(at(0x1008, 0)).unwrap(), b"Bootloader");
         assert_eq!(bench.read(at(0x1009, 0)).unwrap(), b"NUCLEO-F446RE");

@@ -11,8 +11,8 @@ use host_tests::thorough::either;
 use host_tests::watch::expects;
 use monitor::Rule;
 use nodectl::cli::Cli;
+use programmer::sign::image::Image;
 use serde_json::{Value, json};
-use sign::image::Image;
 use sim::world::World;
 
 use super::bench::{Bench, VERSION_B, signed, version_a, version_b};
@@ -188,8 +188,8 @@ fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
         let refusal = try_update(&world, "16", &other, None, &[]).unwrap_err();
         let told = format!(
             "node 16: the image is for board {:08X}h, the node has board {:08X}h",
-            product::BOARD + 1,
-            product::BOARD
+            profiles::product::BOARD + 1,
+            profiles::product::BOARD
         );
         assert!(refusal.contains(&told), "{personality}: {refusal}");
         let refusal = try_update(&world, "16", &other, None, &["--raw"]).unwrap_err();

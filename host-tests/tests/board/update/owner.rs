@@ -3,8 +3,8 @@
 use ed25519_dalek::{SigningKey, VerifyingKey};
 use host_tests::watch::expects;
 use monitor::Rule;
-use sign::image::Image;
-use sign::{key, key_list};
+use programmer::sign::image::Image;
+use programmer::sign::{key, key_list};
 use update::Description;
 use update::key::{KeyList, Rank};
 

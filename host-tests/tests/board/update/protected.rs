@@ -1,7 +1,7 @@
 //! A board with a write-protected bootloader and a flash that cannot be read, as `cargo xtask protect` leaves it.
 
-use bringup_emulated::Probe;
-use protect::{OptionBytes, current, program};
+use programmer::protect::{OptionBytes, current, program};
+use workbench::bringup::Probe;
 
 use super::bench::{version_a, version_b};
 use super::fleet::{boards, update};

@@ -6,7 +6,7 @@ use host_tests::sdo::{Client, Failure};
 use host_tests::thorough::either;
 use host_tests::watch::expects;
 use monitor::Rule;
-use sign::image::Image;
+use programmer::sign::image::Image;
 use update::Status;
 
 use super::bench::{Bench, CLEAR, START, signed, version_a, version_b};

@@ -55,6 +55,18 @@ pub(super) fn receive_pin(bench: &mut Bench<'_>) -> Result<()> {
 
 /// Loop-back by the registers of the controller: the heartbeats of the node go out and come back inside of the chip.
 pub(super) fn loop_back(bench: &mut Bench<'_>) -> Result<()> {
+    const WHAT: &str = "frame in loop-back at the start (2005h)";
+    if let Some(result) = bench.start_test(WHAT, values::LOOP_BACK)? {
+        let names = values::LOOP_BACK_RESULTS;
+        let seen = (result as usize).checked_sub(1).and_then(|place| names.get(place));
+        bench.check(
+            WHAT,
+            seen.unwrap_or(&"not tested"),
+            names[0],
+            result == 1,
+            "The controller is broken, or its clock is off: another chip of the same type",
+        );
+    }
     let before = bench.word(chip::CAN_BTR)?;
     bench.set(0x1017, 0, &100_u16.to_le_bytes())?;
     for kbit in RATES {

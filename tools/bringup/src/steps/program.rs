@@ -14,6 +14,8 @@ use crate::values::{self, COMMANDS};
 /// A value without effect on the measurement: the heartbeat time.
 const SAVED: (u16, u8) = (0x1017, 0);
 const SAVE: (u16, u8) = (0x1010, 2);
+/// What the bound of the stack leaves of it in bytes (`cargo xtask stack`), rounded down.
+const FREE_STACK: u32 = 2000;
 /// The longest erase of 16 KiB in microseconds (STM32F446 datasheet, flash memory programming).
 const LONGEST_ERASE: u32 = 500_000;
 /// The time after a start at which a crash no longer counts, and some more.
@@ -29,6 +31,7 @@ pub(super) fn saves(bench: &mut Bench<'_>) -> Result<()> {
         load(bench)?;
         bench.set(SAVE.0, SAVE.1, b"save")?;
     }
+    stack(bench)?;
     nmt::send(bench.desk.network(), Command::ResetNode, Some(node))?;
     bench.wait(Duration::from_millis(2000))?;
     let found = bench.object(SAVED.0, SAVED.1)? & 0xFFFF;
@@ -48,6 +51,21 @@ pub(super) fn saves(bench: &mut Bench<'_>) -> Result<()> {
         "The flash is slower than its data sheet: a low supply, or a chip at the end of its life",
     );
     lost_events(bench)
+}
+
+/// The stack that neither the load nor the saves have used.
+fn stack(bench: &mut Bench<'_>) -> Result<()> {
+    const WHAT: &str = "unused stack (2005h)";
+    if let Some(bytes) = bench.start_test(WHAT, values::FREE_STACK)? {
+        bench.check(
+            WHAT,
+            format!("{bytes} bytes"),
+            format!("{FREE_STACK} bytes at least"),
+            bytes >= FREE_STACK,
+            "Deeper than `cargo xtask stack` computes: report it with the log",
+        );
+    }
+    Ok(())
 }
 
 /// SYNCs in a row: the receive FIFO of the node is full, and its TPDOs load the bus.

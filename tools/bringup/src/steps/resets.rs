@@ -17,6 +17,8 @@ const PAUSES: [f64; 4] = [0.1, 1.0, 10.0, 60.0];
 /// The time-out of the watchdog in milliseconds at 32 kHz, and what the oscillator allows (17 to 47 kHz).
 const NOMINAL: f64 = 200.0;
 const TIME_OUT: (f64, f64) = (136.0, 376.0);
+/// The LSI in kHz (STM32F446 datasheet, LSI oscillator).
+const LSI: (f64, f64) = (17.0, 47.0);
 
 pub(super) fn causes(bench: &mut Bench<'_>) -> Result<()> {
     let node = bench.node;
@@ -100,8 +102,27 @@ pub(super) fn watchdog(bench: &mut Bench<'_>) -> Result<()> {
         "ms",
         "Outside of the data sheet: the oscillator LSI is broken, or the program fed the watchdog",
     );
+    lsi(bench, time_out)?;
     bench.remark("LSI by this time-out", format!("{:.1} kHz", 32.0 * NOMINAL / time_out), "17 to 47 kHz", "");
     cause(bench, "cause of this reset", "watchdog")
+}
+
+/// The LSI as TIM5 measures it, and the time-out that follows from it.
+fn lsi(bench: &mut Bench<'_>, time_out: f64) -> Result<()> {
+    const WHAT: &str = "LSI by TIM5 (2005h)";
+    let Some(hertz) = bench.start_test(WHAT, values::LSI)? else { return Ok(()) };
+    let kilohertz = f64::from(hertz) / 1000.0;
+    bench.check_range(WHAT, kilohertz, LSI, "kHz", "Outside of the data sheet: another chip of the same type");
+    let expected = 32.0 * NOMINAL / kilohertz.max(1.0);
+    let range = (expected * 0.8, expected * 1.1);
+    bench.check_range(
+        "time-out of the watchdog by this LSI",
+        time_out,
+        (range.0.floor(), range.1.ceil()),
+        "ms",
+        "The watchdog counts otherwise than it was set: flash the images again",
+    );
+    Ok(())
 }
 
 /// The time of the next boot-up message. Heartbeats before it stay in the network.

@@ -19,6 +19,8 @@ const BUSES: (u32, u32) = (0xFC0C, 0b10 << 2 | 0b101 << 10 | 0b100 << 13);
 const WAIT_STATES: (u32, u32) = (0xF, 4);
 /// The reference voltage in each supply: 1.18 to 1.24 V (STM32F446 datasheet, 6.3.24), as codes at 3.3 V.
 const REFERENCE: (f64, f64) = (1464.0, 1540.0);
+/// From switching HSE on to the clock of the PLL in ms: a crystal takes about 2, the PLL 0.3 at most.
+const CLOCK_START: (f64, f64) = (0.01, 10.0);
 /// Error of the clock in ppm: 50 of a crystal, and that of the adapter.
 const CLOCK_ERROR: f64 = 100.0;
 /// Number of words that are read at once.
@@ -112,8 +114,8 @@ fn self_test(bench: &mut Bench<'_>) -> Result<()> {
 }
 
 fn option_bytes(bench: &mut Bench<'_>) -> Result<()> {
-    let options = protect::OptionBytes::from_register(bench.word(chip::FLASH_OPTCR)?);
-    let is_open = options.read_out() == protect::ReadOut::Open && !options.is_proprietary();
+    let options = programmer::protect::OptionBytes::from_register(bench.word(chip::FLASH_OPTCR)?);
+    let is_open = options.read_out() == programmer::protect::ReadOut::Open && !options.is_proprietary();
     bench.check(
         "option bytes",
         options,
@@ -195,6 +197,7 @@ pub(super) fn clock(bench: &mut Bench<'_>) -> Result<()> {
             "Flash the images again",
         );
     }
+    clock_wait(bench)?;
     let error = clock_error(bench)?;
     bench.check_range(
         "clock against that of the adapter, by heartbeats",
@@ -203,6 +206,21 @@ pub(super) fn clock(bench: &mut Bench<'_>) -> Result<()> {
         "ppm",
         "A crystal with the wrong load capacitors, or an internal oscillator in its place",
     );
+    Ok(())
+}
+
+/// The time of oscillator and PLL to start, measured by the program itself.
+fn clock_wait(bench: &mut Bench<'_>) -> Result<()> {
+    const WHAT: &str = "start of the clock (2005h)";
+    if let Some(microseconds) = bench.start_test(WHAT, values::CLOCK_WAIT)? {
+        bench.check_range(
+            WHAT,
+            f64::from(microseconds) / 1000.0,
+            CLOCK_START,
+            "ms",
+            "A crystal that starts slowly: the load capacitors, or a crystal with a high ESR (AN2867)",
+        );
+    }
     Ok(())
 }
 

@@ -18,14 +18,18 @@ mod sdo;
 mod storage;
 mod subject;
 mod sync;
-mod verdict;
 
 pub use profiles::Profile;
 pub use run::{Options, Result, Run, run};
-pub use subject::{Setup, Subject};
-pub use verdict::{Deviation, Outcome, Stop, Verdict};
+pub use subject::{Deviation, Outcome, Setup, Stop, Subject, Verdict};
 
-use subject::prelude;
+/// The names that every check needs.
+mod prelude {
+    pub(super) use canopen::nmt::{Command, State};
+
+    pub(super) use super::subject::{OFF, RPDO, Refusal, TPDO, abort, ensure, fail, skip};
+    pub(super) use super::{Check, Outcome, Stop, Subject};
+}
 
 /// A rule that a device has to follow.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,7 @@
 use canopen::nmt::{Command, State};
 use canopen::{Duration, NodeId};
 
-use super::subject::Refusal;
-use super::verdict::ensure;
+use super::subject::{Refusal, ensure};
 use super::{Check, Effect, Level, Outcome, Stop, Subject, Verdict};
 use crate::Logged;
 use crate::bus::BusError;

@@ -12,7 +12,7 @@ use crate::heartbeat;
 use crate::meaning;
 use crate::object::at;
 use crate::text::visible;
-use crate::update::{Program, Status};
+use crate::update::{Event, Log, Program, Status};
 
 /// Time added to the heartbeat period when waiting for a heartbeat.
 const MARGIN: Duration = Duration::from_millis(200);
@@ -55,6 +55,17 @@ struct ProgramReport {
     key_generation: Option<u32>,
     downloaded: Option<u32>,
     kept: Option<u32>,
+    sector_erases: Option<u32>,
+    clears_allowed: Option<u32>,
+    log: Vec<LogEntry>,
+}
+
+/// An event of an update (2006h), the newest first.
+#[derive(Serialize)]
+struct LogEntry {
+    version: String,
+    key_generation: u8,
+    event: String,
 }
 
 impl Info {
@@ -118,6 +129,8 @@ fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>,
     let trial = own(0x2002, 1)?.and_then(trial);
     let mut fact = |sub| own(0x2004, sub);
     let (security_counter, key_generation, downloaded, kept) = (fact(2)?, fact(3)?, fact(4)?, fact(5)?);
+    let (sector_erases, clears_allowed) = (fact(6)?, fact(7)?);
+    let log = if is_ours { session.optional(node, at(0x2006, 0))?.unwrap_or_default() } else { Vec::new() };
     let mut program = Program::new(&mut session.network, node, options);
     Ok(Some(ProgramReport {
         trial,
@@ -125,6 +138,9 @@ fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>,
         key_generation,
         downloaded: downloaded.filter(|&id| id != 0),
         kept: kept.filter(|&id| id != 0),
+        sector_erases,
+        clears_allowed,
+        log: log_entries(&log),
         running: program.is_running()?,
         identification: program.identification()?,
         status: program.status()?.as_ref().map(Status::to_string),
@@ -142,6 +158,15 @@ fn trial(state: u32) -> Option<&'static str> {
         3 => "the downloaded program was taken back: it was withdrawn, or not confirmed in time",
         _ => return None,
     })
+}
+
+fn log_entries(log: &[u8]) -> Vec<LogEntry> {
+    let entry = |event: Event| LogEntry {
+        version: event.version.to_string(),
+        key_generation: event.generation,
+        event: event.outcome.to_string(),
+    };
+    Log::from_bytes(log).events().map(entry).collect()
 }
 
 fn number(session: &mut Session, node: NodeId, index: u16, sub: u8) -> Result<Option<u32>, Failure> {
@@ -191,6 +216,14 @@ impl fmt::Display for ProgramReport {
         for (name, id) in [("downloaded", self.downloaded), ("kept", self.kept)] {
             id.iter().try_for_each(|_| write!(f, "\n  {name:<18}{}", hex(id)))?;
         }
-        Ok(())
+        if let Some(erases) = self.sector_erases {
+            write!(f, "\n  sector erases     {erases}")?;
+        }
+        if let Some(clears) = self.clears_allowed {
+            write!(f, "\n  clears allowed    {clears}")?;
+        }
+        self.log.iter().try_for_each(|LogEntry { version, event, key_generation }| {
+            write!(f, "\n  update log        {version}, key generation {key_generation}: {event}")
+        })
     }
 }

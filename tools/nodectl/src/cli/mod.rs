@@ -23,6 +23,7 @@ mod scan;
 mod serve;
 mod session;
 mod sheets;
+mod source;
 mod store;
 mod trace;
 mod traffic;

@@ -322,7 +322,7 @@ pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
 
 /// A data sheet or a configuration file.
 pub(super) fn sheet(path: &Path) -> Result<Eds, Failure> {
-    let bytes = input::read(path, LARGEST_SHEET).map_err(|error| match error.kind() {
+    let bytes = wire::input::read(path, LARGEST_SHEET).map_err(|error| match error.kind() {
         ErrorKind::FileTooLarge => Failure::file(path, "it is larger than any data sheet (4 MiB)"),
         _ => Failure::file(path, error),
     })?;

@@ -76,7 +76,8 @@ impl Update {
     }
 
     fn image(&self) -> Result<Image, Failure> {
-        let bytes = input::read(&self.image, LARGEST).map_err(|error| Failure::file(&self.image, error))?;
+        let bytes =
+            wire::input::read(&self.image, LARGEST).map_err(|error| Failure::file(&self.image, error))?;
         if self.raw {
             return Ok(Image::opaque(bytes));
         }

@@ -13,7 +13,7 @@ mod program;
 mod trial;
 mod watcher;
 
-pub use ::update::{Status, Version};
+pub use ::update::{Event, Log, Status, Version};
 pub use authorisation::AuthorisationKey;
 pub use error::Error;
 pub use fleet::update;

@@ -10,7 +10,12 @@ use crate::pressure::Pressure;
 use crate::wire::{Wire, client};
 
 fn identity(serial: u32) -> Identity {
-    Identity { vendor: product::VENDOR_ID, product: 1, revision: product::REVISION, serial }
+    Identity {
+        vendor: profiles::product::VENDOR_ID,
+        product: 1,
+        revision: profiles::product::REVISION,
+        serial,
+    }
 }
 
 fn master(network: &mut Network) -> Master<'_> {

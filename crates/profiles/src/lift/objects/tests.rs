@@ -1,6 +1,6 @@
 use crate::board::PowerOn;
 use crate::board::{Inputs, RawEncoder, RawSample};
-use crate::communication::{SELF_TEST_ROW, TRANSFER_BUFFER, personality};
+use crate::communication::{SELF_TEST_ROW, TRANSFER_BUFFER, UPDATE_LOG_ROW, personality};
 use crate::lift::catalogue::{CobId, Content, PDOS as CATALOGUE};
 use crate::lift::load::{FULL_LOAD, OVERLOAD, ZERO_LOAD};
 use crate::lift::position::{INVERTED, UNKNOWN};
@@ -125,7 +125,7 @@ fn the_defaults_of_the_table_are_those_of_the_measurement() {
 #[test]
 fn every_parameter_is_saved_and_nothing_else() {
     let personality = personality(Personality::Lift.number(), Personality::ALL.len());
-    let common = [personality, SELF_TEST_ROW, TRANSFER_BUFFER];
+    let common = [personality, SELF_TEST_ROW, UPDATE_LOG_ROW, TRANSFER_BUFFER];
     let others = || CALIBRATION.iter().chain(&common);
     let application = rows().filter(|row| row.index >= 0x2000);
     let own = application.filter(|row| !others().any(|other| other.index == row.index));
@@ -599,7 +599,7 @@ fn the_pdos_are_those_of_the_catalogue() {
 /// A shared identifier would put two PDOs into one frame.
 #[test]
 fn no_two_pdos_share_an_identifier() {
-    let mut ids: Vec<i64> = rows().filter(|row| row.rule == Rule::PdoPredefined).map(cob_id).collect();
+    let mut ids: Vec<i64> = rows().filter(|row| row.rule() == Rule::PdoPredefined).map(cob_id).collect();
     assert_eq!(ids.len(), 15);
     ids.sort_unstable();
     ids.dedup();

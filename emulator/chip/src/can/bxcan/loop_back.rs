@@ -30,7 +30,11 @@ impl BxCan {
     pub(super) fn end_loop(&mut self, looped: &Loop) {
         self.transmitter.sent();
         self.status.sent();
-        self.store(&looped.frame);
+        if self.lost_loops > 0 {
+            self.lost_loops -= 1;
+        } else {
+            self.store(&looped.frame);
+        }
         if self.is_set(INRQ) || self.is_set(SLEEP) {
             self.follow_requests(looped.end);
         }

@@ -2,9 +2,9 @@
 
 use canbus::{Monitor, Time};
 
+use super::status::Status;
+use super::transmit::Transmitter;
 use super::{ABOM, AWUM, BxCan, INRQ, MCR_RESET, MCR_WRITABLE, RESET, SLEEP};
-use crate::can::status::Status;
-use crate::can::transmit::Transmitter;
 use crate::register::{bit, flag};
 
 /// The mode that CAN_MSR acknowledges.
@@ -71,6 +71,11 @@ impl BxCan {
             (true, _) => self.stop(Mode::Initialisation),
             (false, true) => self.stop(Mode::Sleep),
             (false, false) if self.mode == Mode::Normal => self.recover(now),
+            // The feedback is internal: nothing on the bus delays it.
+            (false, false) if self.loops_back() => {
+                self.monitor.cancel();
+                self.synchronised(now);
+            }
             (false, false) if !self.monitor.is_waiting() => self.monitor.wait(1, now),
             (false, false) => {}
         }

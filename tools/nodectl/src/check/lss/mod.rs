@@ -5,7 +5,7 @@ mod configure;
 mod select;
 
 use super::Check;
-use super::subject::prelude::{Outcome, Stop, Subject, fail, skip};
+use super::prelude::{Outcome, Stop, Subject, fail, skip};
 use canopen::lss::{Identity, Part, Request, Response};
 
 pub(super) const CHECKS: &[&[Check]] = &[select::CHECKS, configure::CHECKS];

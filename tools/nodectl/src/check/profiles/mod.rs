@@ -11,7 +11,7 @@ mod measuring;
 use clap::ValueEnum;
 
 use super::Check;
-use super::subject::prelude::{Outcome, Subject, ensure};
+use super::prelude::{Outcome, Subject, ensure};
 
 /// A device profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -3,9 +3,8 @@
 use canopen::{Duration, Frame};
 
 use super::Subject;
+use super::verdict::{Outcome, skip};
 use crate::Logged;
-use crate::check::Outcome;
-use crate::check::verdict::skip;
 
 /// A place in the log of the bus.
 #[derive(Clone, Copy, Debug)]

@@ -2,9 +2,8 @@
 
 use canopen::nmt::{Command, State};
 
+use super::verdict::{Outcome, fail, skip};
 use super::{Refusal, Subject, abort};
-use crate::check::Outcome;
-use crate::check::verdict::{fail, skip};
 
 /// How long a device may take to change its state.
 const SETTLE: u64 = 20;

@@ -6,6 +6,7 @@ mod pdo;
 mod sdo;
 mod segments;
 mod sheet;
+mod verdict;
 
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
@@ -18,15 +19,8 @@ pub(in crate::check) use pdo::mapped;
 pub(in crate::check) use pdo::{OFF, Pdo, RPDO, TPDO};
 pub(in crate::check) use sdo::{Refusal, abort};
 pub(in crate::check) use sheet::size;
-
-/// The names that every check needs.
-pub(in crate::check) mod prelude {
-    pub(in crate::check) use canopen::nmt::{Command, State};
-
-    pub(in crate::check) use super::super::verdict::{ensure, fail, skip};
-    pub(in crate::check) use super::super::{Check, Outcome, Stop, Subject};
-    pub(in crate::check) use super::{OFF, RPDO, Refusal, TPDO, abort};
-}
+pub use verdict::{Deviation, Outcome, Stop, Verdict};
+pub(in crate::check) use verdict::{ensure, fail, skip};
 
 /// The settings for a device under test.
 #[derive(Clone, Debug)]

@@ -7,8 +7,7 @@ use eds::Entry;
 
 use super::Subject;
 use super::sheet::size;
-use crate::check::Outcome;
-use crate::check::verdict::{fail, skip};
+use super::verdict::{Outcome, fail, skip};
 use crate::object::at;
 use crate::pdo_parameters::slots;
 

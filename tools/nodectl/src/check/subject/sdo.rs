@@ -5,8 +5,7 @@ use canopen::client::sdo::Error;
 use canopen::sdo::{Multiplexer, Request};
 
 use super::Subject;
-use crate::check::Outcome;
-use crate::check::verdict::{ensure, fail, skip};
+use super::verdict::{Outcome, ensure, fail, skip};
 use crate::object::{Place, at};
 use crate::sdo::{Cause, Client, Options};
 

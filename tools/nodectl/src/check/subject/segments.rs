@@ -2,9 +2,8 @@
 
 use canopen::sdo::{Bytes, Initiate, Request, Response, Segment};
 
+use super::verdict::{Outcome, fail, skip};
 use super::{Refusal, Subject};
-use crate::check::Outcome;
-use crate::check::verdict::{fail, skip};
 use crate::object::at;
 
 impl Subject<'_> {

@@ -3,8 +3,7 @@
 use eds::{Class, Eds, Entry};
 
 use super::Subject;
-use crate::check::Outcome;
-use crate::check::verdict::skip;
+use super::verdict::{Outcome, skip};
 
 impl Subject<'_> {
     /// The data sheet; skipped without a data sheet.

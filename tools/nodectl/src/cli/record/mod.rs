@@ -21,7 +21,7 @@ pub(super) use self::rows::seconds as seconds_between;
 use self::rows::{Rows, Sink};
 use self::table::Table;
 use self::target::{Target, is_standard};
-use super::monitor::Source;
+use super::source::Source;
 use super::{Failure, Session};
 use crate::acquisition::{Acquisition, Sample, Signal};
 use crate::text::note;

@@ -1,4 +1,4 @@
-//! `nodectl serve`: the bus in a browser. The messages are those of `tools/page/PROTOCOL.md`.
+//! `nodectl serve`: the bus in a browser. The messages are those of `tools/nodectl/PROTOCOL.md`.
 //!
 //! One thread, the [`pump`], owns the bus and the state of all nodes; pages and jobs send it orders. Work that takes
 //! several frames (a transfer, a search, an update) is a [`jobs`] job on a thread of its own, with a [`port`] to the
@@ -8,6 +8,7 @@ mod bus_time;
 mod jobs;
 mod live;
 mod nodes;
+mod order;
 mod pages;
 mod port;
 mod pump;
@@ -26,7 +27,8 @@ use std::thread;
 use clap::Args;
 use serde::Serialize;
 
-use self::pump::{Order, Pump, Setup};
+use self::order::Order;
+use self::pump::{Pump, Setup};
 use super::{Failure, Options, Output};
 use crate::bus::Address;
 
@@ -82,9 +84,10 @@ impl Serve {
         let (orders, inbox) = mpsc::channel();
         let from_pages = orders.clone();
         let listener = move |said| drop(from_pages.send(Order::Page(said)));
-        let server = page::start(&page::Options { address: self.page }, listener).map_err(|error| {
-            Failure::Usage(format!("the page cannot be served at {}: {error}", self.page))
-        })?;
+        let server =
+            crate::page::start(&crate::page::Options { address: self.page }, listener).map_err(|error| {
+                Failure::Usage(format!("the page cannot be served at {}: {error}", self.page))
+            })?;
         output.print(&Served { page: server.url.clone() })?;
         if self.until_end_of_input {
             thread::spawn(end_with_input);

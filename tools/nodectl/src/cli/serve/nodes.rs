@@ -307,7 +307,7 @@ mod tests {
         let at = crate::object::at;
         assert!(!identity.hear(at(0x1017, 0), &[1, 0]));
         assert!(identity.hear(at(0x1000, 0), &0x0002_0194_u32.to_le_bytes()));
-        assert!(identity.hear(at(0x1018, 1), &product::VENDOR_ID.to_le_bytes()));
+        assert!(identity.hear(at(0x1018, 1), &profiles::product::VENDOR_ID.to_le_bytes()));
         assert!(identity.catalogue().is_none());
         assert!(identity.hear(at(0x1018, 2), &1_u32.to_le_bytes()));
         assert_eq!(identity.personality.as_deref(), Some("pressure"));

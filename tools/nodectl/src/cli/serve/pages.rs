@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::page::{Hub, PageId};
 use canopen::NodeId;
-use page::{Hub, PageId};
 
 use super::live::{Batch, Key};
 use super::tracer::Row;

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvErr
 
 use canopen::{Frame, Instant, NodeId};
 
-use super::pump::Order;
+use super::order::Order;
 use crate::bus::{Bus, BusError, NoBus, Received, clock};
 use crate::sdo::Channel;
 

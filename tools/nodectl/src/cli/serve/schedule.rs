@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::page::PageId;
 use canopen::NodeId;
-use page::PageId;
 
 /// The resource that a job needs exclusively.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value as Json;
 
-use super::pump::Order;
+use super::order::Order;
 
 /// The time-out for an answer of the simulator.
 const PATIENCE: Duration = Duration::from_secs(5);

@@ -23,13 +23,13 @@ pub(super) use pdo::{poll, survey};
 
 use super::live::Survey;
 use super::nodes::Identity;
+use super::order::{Order, Refusal};
 use super::port::{self, Interest};
-use super::pump::{self, Refusal};
 use super::request::{What, Whom};
 use super::schedule::Lane;
 use super::stimuli;
 use super::turn::Turn;
-use crate::cli::store::Order;
+use crate::cli::store;
 use crate::cli::{Failure, Options, Output, Session};
 use crate::sdo::Channel;
 use crate::trace::Knowledge;
@@ -84,19 +84,19 @@ pub(super) enum Learned {
 /// The environment of a job.
 pub(super) struct Context {
     pub(super) session: Session,
-    orders: Sender<pump::Order>,
+    orders: Sender<Order>,
     number: u64,
 }
 
 impl Context {
     pub(super) fn progress(&self, progress: Json) {
-        let _ = self.orders.send(pump::Order::Progress(self.number, progress));
+        let _ = self.orders.send(Order::Progress(self.number, progress));
     }
 
     /// A function that sends an event to all pages.
     fn teller(&self) -> impl Fn(Json) + use<> {
         let orders = self.orders.clone();
-        move |event| drop(orders.send(pump::Order::Tell(event)))
+        move |event| drop(orders.send(Order::Tell(event)))
     }
 
     /// A function that reports the number of questions that have been asked, out of `all`.
@@ -106,13 +106,13 @@ impl Context {
         move |done| {
             if told != Some(done) {
                 told = Some(done);
-                let _ = orders.send(pump::Order::Progress(number, json!({ "done": done, "all": all })));
+                let _ = orders.send(Order::Progress(number, json!({ "done": done, "all": all })));
             }
         }
     }
 
     pub(super) fn learned(&self, node: NodeId, learned: Learned) {
-        let _ = self.orders.send(pump::Order::Learned(node, learned));
+        let _ = self.orders.send(Order::Learned(node, learned));
     }
 
     /// The catalogue of a node. A catalogue that the session did not have yet is reported to the pump.
@@ -134,7 +134,7 @@ impl Context {
             // A bar of twenty steps is fine enough.
             if all > 0 && (done * 20 / all != told || done == 0) {
                 told = done * 20 / all;
-                let _ = orders.send(pump::Order::Progress(number, json!({ "done": done, "all": all })));
+                let _ = orders.send(Order::Progress(number, json!({ "done": done, "all": all })));
             }
         }
     }
@@ -161,7 +161,7 @@ pub(super) fn begin(
     known: Option<Known>,
     turn: Arc<Turn>,
     options: &Options,
-    orders: &Sender<pump::Order>,
+    orders: &Sender<Order>,
 ) {
     let (options, orders) = (options.clone(), orders.clone());
     let told = orders.clone();
@@ -171,13 +171,11 @@ pub(super) fn begin(
         }));
         let result = result
             .unwrap_or_else(|_| Err(Refusal::new("an error of this program: the request was given up")));
-        let _ = orders.send(pump::Order::Done(number, result));
+        let _ = orders.send(Order::Done(number, result));
     };
     if thread::Builder::new().name("job".to_owned()).spawn(run).is_err() {
-        let _ = told.send(pump::Order::Done(
-            number,
-            Err(Refusal::new("this machine has no room for another thread")),
-        ));
+        let _ =
+            told.send(Order::Done(number, Err(Refusal::new("this machine has no room for another thread"))));
     }
 }
 
@@ -187,14 +185,14 @@ fn work(
     known: Option<Known>,
     turn: Arc<Turn>,
     options: &Options,
-    orders: &Sender<pump::Order>,
+    orders: &Sender<Order>,
 ) -> Result<Json, Refusal> {
     let for_port = orders.clone();
     let interest = known.as_ref().map_or(job.interest, |known| Interest::Node(known.node, known.channel));
     let network = Network::open(move || Ok(port::open(&for_port, interest)));
     let mut network = network.map_err(|error| Refusal::new(error.to_string()))?;
     let parked = orders.clone();
-    network.set_gate(move || turn.pass(|| drop(parked.send(pump::Order::Parked(number)))));
+    network.set_gate(move || turn.pass(|| drop(parked.send(Order::Parked(number)))));
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
     session.has_many_nodes = true;
     if let Some(Known { node, channel, catalogue }) = known {
@@ -228,8 +226,8 @@ pub(super) fn task(what: What, means: Means) -> Result<Task, String> {
             let node = if let Whom::Node(node) = node { Some(node.0) } else { None };
             with(Lane::Nothing, overview::nmt(node, command))
         }
-        What::Save { node, group } => of(node, overview::store(node.0, Order::Save, group)),
-        What::Restore { node, group } => of(node, overview::store(node.0, Order::Restore, group)),
+        What::Save { node, group } => of(node, overview::store(node.0, store::Order::Save, group)),
+        What::Restore { node, group } => of(node, overview::store(node.0, store::Order::Restore, group)),
         What::Signals { node } => of(node, survey(node.0)),
         What::Dictionary { node } => of(node, objects::dictionary(node.0)),
         What::Read { node, objects } => {

@@ -10,14 +10,14 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::Duration as StdDuration;
 
-use canopen::{Duration, Frame, Instant, NodeId};
-use page::{FromPage, Hub, PageId};
+use canopen::{Duration, Instant, NodeId};
 use serde_json::Value as Json;
 
 use super::bus_time::BusTime;
-use super::jobs::{Job, Learned};
+use super::jobs::Job;
 use super::live::Live;
 use super::nodes::Nodes;
+use super::order::{Order, Refusal};
 use super::pages::Pages;
 use super::port::Outlet;
 use super::schedule::Schedule;
@@ -28,6 +28,7 @@ use crate::Catalogue;
 use crate::bus::{Bus, BusError, clock};
 use crate::cli::Options;
 use crate::other_clients::OtherClients;
+use crate::page::{Hub, PageId};
 
 /// The number of frames that are taken before the next look for orders.
 const AT_ONCE: usize = 512;
@@ -52,36 +53,6 @@ const ACTIVE: Duration = Duration::from_millis(5000);
 
 /// The version of the protocol with the pages.
 const PROTOCOL: u32 = 1;
-
-/// An order to the pump.
-pub(super) enum Order {
-    /// From a page.
-    Page(FromPage),
-    /// From a job: a port to pass frames to.
-    Open(Outlet),
-    /// From a job: a frame to send.
-    Send(Frame),
-    /// From a job: its progress.
-    Progress(u64, Json),
-    /// From a job: an event for all pages.
-    Tell(Json),
-    /// From a job: a fact about a node.
-    Learned(NodeId, Learned),
-    /// From a job: it has stopped between two transfers.
-    Parked(u64),
-    /// From a job: the result.
-    Done(u64, Result<Json, Refusal>),
-    /// From the simulator: a change of the stimuli.
-    Stimuli(Json),
-}
-
-/// Why a request is refused.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Refusal {
-    pub(super) text: String,
-    /// The abort code of a node that has refused.
-    pub(super) abort: Option<u32>,
-}
 
 /// The page that waits for a job.
 #[derive(Clone, Debug)]
@@ -206,11 +177,5 @@ impl Pump {
 
     fn now(&self) -> f64 {
         self.time.now(clock::now())
-    }
-}
-
-impl Refusal {
-    pub(super) fn new(text: impl Into<String>) -> Refusal {
-        Refusal { text: text.into(), abort: None }
     }
 }

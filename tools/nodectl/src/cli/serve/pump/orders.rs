@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration as StdDuration;
 
+use crate::page::{FromPage, PageId};
 use canopen::NodeId;
-use page::{FromPage, PageId};
 use serde_json::{Value as Json, json};
 
 use super::{AT_ONCE, Asker, Order, PAUSE, PROTOCOL, Pump, Refusal, Waiting};

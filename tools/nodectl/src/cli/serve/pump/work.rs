@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::page::PageId;
 use canopen::NodeId;
-use page::PageId;
 use serde_json::{Value as Json, json};
 
 use super::{Asker, Pump, Refusal, Running, Waiting};
