@@ -139,7 +139,7 @@ fn every_parameter_is_saved_and_nothing_else() {
 /// Except for the trial of a program, the words of the panel and the lift number, which do not concern the measurement,
 /// and the values that a preset and a reference weight leave behind.
 #[test]
-fn every_parameter_changes_what_the_measurement_gets() {
+fn every_parameter_reaches_the_measurement() {
     let silent = [0x2002, 0x2320, 0x2321, 0x6001, 0x6100, 0x6120, 0x6200, 0x6382, 0x6486];
     let special = |index, sub| match (index, sub) {
         (0x2105 | 0x2301, _) | (0x2103, 3) => 0,
