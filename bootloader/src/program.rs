@@ -41,7 +41,7 @@ pub(crate) struct Program {
     product: u32,
     /// 1018h:4.
     serial_number: u32,
-    /// The program was told to start, and may be started.
+    /// A master has requested the start of the program, which is allowed.
     starts: bool,
 }
 

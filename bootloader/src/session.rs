@@ -79,7 +79,7 @@ impl Session {
         }
     }
 
-    /// Goes on the bus at a rate, or listens at one. Frames that were waiting are dropped.
+    /// Joins the bus at a rate, or listens at one. Frames that were waiting are dropped.
     pub(crate) fn go(&mut self, step: Step, out: &mut Outbox) {
         out.clear();
         match step {

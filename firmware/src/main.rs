@@ -4,11 +4,11 @@
 //! | priority | task | why there |
 //! |---|---|---|
 //! | 6 | `receive_process`, `receive_services` | a FIFO of three places fills in 141 us at 1 Mbit/s |
-//! | 5 | `sample` | above everything whose run time depends on the traffic, but for the moving of frames |
+//! | 5 | `sample` | above everything whose run time depends on the traffic, except the moving of frames |
 //! | 4 | `transmit` | the mailboxes hold three frames; locking the queue delays no sample |
 //! | 3 | `process` | SYNC, RPDO, TPDO: never behind an SDO transfer |
 //! | 2 | `serve` | SDO, NMT, heartbeat, EMCY, errors of the bus |
-//! | 1 | `store` | stores parameters: whatever it waits for, nobody waits for it |
+//! | 1 | `store` | stores parameters; may block in flash writes, so it has the lowest priority |
 //! | 0 | `idle` | sleeps |
 //!
 //! Log lines mask no interrupt, whatever the priority: see the features of defmt-rtt in the workspace.
@@ -39,7 +39,7 @@ const STORAGE: Interrupt = Interrupt::SDIO;
 const SAMPLING: Interrupt = Interrupt::DMA2_STREAM0;
 /// Pended after a frame was put into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
-/// The node goes on the bus when its first sample has been taken, so that no PDO carries an older value.
+/// The node joins the bus when its first sample has been taken, so that no PDO carries an older value.
 const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 
 #[panic_handler]

@@ -16,8 +16,9 @@ def hashes() -> dict[str, str]:
     found = {}
     for group, folders in SOURCES.items():
         whole = hashlib.sha256()
-        for file in sorted(file for folder in folders for file in (ROOT / folder).rglob("*") if file.is_file()):
-            whole.update(str(file.relative_to(ROOT)).encode() + b"\0" + file.read_bytes() + b"\0")
+        for folder in folders:
+            for file in sorted(file for file in (ROOT / folder).rglob("*") if file.is_file()):
+                whole.update(str(file.relative_to(ROOT / folder)).encode() + b"\0" + file.read_bytes() + b"\0")
         found[group] = whole.hexdigest()
     return found
 

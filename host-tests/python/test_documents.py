@@ -271,7 +271,8 @@ def test_every_emergency_code_is_explained():
 
 def test_every_abort_code_is_explained():
     source = (ROOT / "crates/canopen/src/sdo/abort.rs").read_text(encoding="utf-8")
-    known = {f"{a} {b}h" for a, b in re.findall(r"=> 0x([0-9A-F]{4})_([0-9A-F]{4}),", source)}
+    digits = re.findall(r"=> 0x([0-9A-F])([0-9A-F])([0-9A-F]{2}),", source)
+    known = {f"0{kind}0{group} 00{code}h" for kind, group, code in digits}
     text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
     section = text.split("## SDO abort codes")[1].split("\n## ")[0]
     assert set(re.findall(r"^\| ([0-9A-F]{4} [0-9A-F]{4}h)", section, re.MULTILINE)) == known

@@ -22,7 +22,7 @@ const NO_PROBE: &str = "No debug probes were found";
 pub(crate) struct Flags {
     /// The ELF file of the application [default: the application is built]
     application: Option<PathBuf>,
-    /// Write a development bootloader: it starts programs that nobody has signed
+    /// Write a development bootloader: it starts unsigned programs
     #[arg(long, required_unless_present = "key", conflicts_with = "key")]
     development: bool,
     /// Write the bootloader of an owner, which trusts this secret key, and sign with it
@@ -45,7 +45,7 @@ pub(crate) struct Flags {
 }
 
 impl Flags {
-    /// Refuses before the build when no probe or no board is connected, so that nobody waits for a build that is of no
+    /// Refuses before the build when no probe or no board is connected, to save the wait for a build that is of no
     /// use.
     fn check(&self) -> Result<()> {
         setup::check(if self.dry_run { setup::IMAGES } else { setup::FLASH })?;

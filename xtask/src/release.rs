@@ -1,5 +1,5 @@
 //! `cargo xtask release`: checks the sources and makes the files of a release (docs/release.md). The tag, the crate and
-//! the page of the release are left to the maintainer, because nobody can take them back.
+//! the page of the release are left to the maintainer, because they cannot be undone.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -58,7 +58,7 @@ pub(crate) fn make(flags: &Flags) -> Result<()> {
     Ok(())
 }
 
-/// What keeps the sources from being a release.
+/// The reasons against a release of the sources.
 fn mistakes() -> Result<Vec<String>> {
     let mut mistakes = Vec::new();
     let changelog = fs::read_to_string(root().join("CHANGELOG.md"))?;

@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_ram_holds_after_power_on_is_no_crash() {
+    fn random_ram_after_power_on_is_no_crash() {
         assert_eq!(Crash::open(&[0; WORDS]), None);
         assert_eq!(Crash::open(&[u32::MAX; WORDS]), None);
     }

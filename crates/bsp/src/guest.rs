@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_master_that_is_alone_is_understood_once_it_is_error_passive() {
+    fn a_lone_master_is_received_after_it_is_error_passive() {
         let mut guest = with(None);
         for millis in 0..10 {
             assert_eq!(guest.step(Heard::Error, Instant(millis * 1_000)), Step::Stay);

@@ -92,7 +92,7 @@ fn value(first: u16, pdo: u16) -> Option<Field> {
 
 // ------------------------------------------------------------------------------------------------------- application
 
-/// What the host is told.
+/// The messages to the host.
 struct Host;
 
 impl Host {

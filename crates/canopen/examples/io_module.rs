@@ -133,7 +133,7 @@ impl Io {
         self.set(WRITE.get(image) ^ POLARITY_OUT.get(image));
     }
 
-    /// Sets the outputs to their error values, when nobody controls them any more.
+    /// Sets the outputs to their error values, when no master controls them any more.
     fn fail(&mut self, image: &[u8]) {
         let (mode, value) = (ERROR_MODE.get(image), ERROR_VALUE.get(image));
         self.set(self.outputs & !mode | value & mode);

@@ -47,7 +47,7 @@ use time::{Span, Tick};
 pub use time_stamp::TimeOfDay;
 pub use transmit::{QueueFull, Transmit};
 
-/// What the macros name; not for other use.
+/// Items for the macros; not for other use.
 #[doc(hidden)]
 pub mod plumbing {
     pub use crate::array::Array;

@@ -53,7 +53,7 @@ pub trait Transmit {
     }
 
     /// Whether a queued PDO waits for the bus: a frame with a CAN-ID up to [`CanId::LAST_PDO`](crate::CanId::LAST_PDO). While
-    /// other nodes hold the bus, a device earns no share of it for its PDOs, so that less urgent frames get through. A
+    /// other nodes hold the bus, a device earns no share of the time for its PDOs, so that less urgent frames get through. A
     /// queue that cannot tell returns `false`.
     fn has_waiting_pdo(&self) -> bool {
         false

@@ -233,7 +233,7 @@ proptest! {
     #![proptest_config(repeatable())]
 
     #[test]
-    fn any_multiplexed_pdo_parses_to_what_it_encodes(frame: [u8; 8]) {
+    fn any_multiplexed_pdo_encodes_to_its_own_bytes(frame: [u8; 8]) {
         use canopen::pdo::Mpdo;
         if let Some(mpdo) = Mpdo::parse(frame) {
             prop_assert_eq!(mpdo.encode(), frame);

@@ -70,7 +70,7 @@ fn an_entry_has_type_default_limits_and_mapping() {
 }
 
 #[test]
-fn what_does_not_follow_from_the_rows_is_the_vendors() {
+fn keys_without_a_row_are_the_vendors() {
     let mut info = DeviceInfo::new("Example", "I/O module");
     (info.file_name, info.file_revision, info.date) = ("io.eds", 3, Some(("11-25-2026", "12:00AM")));
     (info.bit_rates, info.has_lss) = (&[125, 250], false);

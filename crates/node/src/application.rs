@@ -275,7 +275,7 @@ mod tests {
         (application, image)
     }
 
-    /// What the PDOs depend on: bit 31 of all COB-IDs, and what is broadcast.
+    /// The inputs of the PDOs: bit 31 of all COB-IDs, and what is broadcast.
     fn pdos(application: &NodeApplication, image: &[u8]) -> Vec<bool> {
         let entries = application.setup.personality.dictionary().entries();
         let state = |entry: Entry| {

@@ -43,7 +43,7 @@ impl NodeApplication {
         if is_right { Ok(()) } else { Err(Abort::InvalidValue) }
     }
 
-    /// Who gives a command that [`admit`](Self::admit) accepts: the holder of the key, if there is a key.
+    /// The sender of a command that [`admit`](Self::admit) accepts: the holder of the key, if there is a key.
     pub(crate) fn commander(&self) -> Cause {
         if self.authorisation.asks() { Cause::Holder } else { Cause::Command }
     }

@@ -8,7 +8,7 @@
 //! | 132 | device record, log |
 //! | 140 | device record, log, retained state |
 //!
-//! A device record of zeros is none: the log does not turn the defaults of a new node into stored values.
+//! A device record of zeros is not valid: the log does not turn the defaults of a new node into stored values.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use profiles::board::POSITION_RECORD_WORDS;
@@ -121,11 +121,8 @@ mod tests {
     use super::*;
 
     const PAGES: Pages = Pages::new(0, 4 * 1024);
-    const EVENT: Event = Event {
-        outcome: Outcome::OnTrial,
-        version: Version { major: 1, minor: 2, patch: 3 },
-        generation: 0,
-    };
+    const EVENT: Event =
+        Event { outcome: Outcome::OnTrial, version: Version { major: 1, minor: 2, patch: 3 }, generation: 0 };
 
     fn store(flash: &mut [u8]) -> Store<Memory<&mut [u8]>> {
         Store::prepare(View::open(Memory(flash), PAGES).unwrap()).unwrap()

@@ -11,7 +11,7 @@ use crate::{Next, Protocol, fault};
 const HOLD: u16 = 100;
 /// The same for a fault that has come back: a contact that fails a few times a second is one fault as well.
 const LONG_HOLD: u16 = 1000;
-/// Milliseconds after the reported end in which a fault comes back.
+/// Milliseconds after the reported end in which a fault returns.
 const MEMORY: u16 = 2000;
 
 /// The faults of the profile that are reported: one bit for each, in the order of the profile.
@@ -98,7 +98,7 @@ impl Protocol {
 mod tests {
     use super::*;
 
-    /// The number of reports in 20 s of a fault that lasts 10 ms and comes back after each period.
+    /// The number of reports in 20 s of a fault that lasts 10 ms and returns after each period.
     fn reports(period: u32) -> u32 {
         let mut shown = Shown::default();
         (0..20_000).map(|ms| shown.update(u32::from(ms % period < 10)).count_ones()).sum()

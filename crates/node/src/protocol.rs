@@ -75,7 +75,7 @@ impl Protocol {
         self.device.state()
     }
 
-    /// What the indicators RUN and ERROR show.
+    /// The states of the indicators RUN and ERROR.
     #[must_use]
     pub fn indicators(&self, bus: BusHealth) -> Indicators {
         self.device.indicators(bus)

@@ -1,4 +1,4 @@
-//! 2002h: the trial of a new program (docs/update.md). The previous program comes back unless the new one is confirmed.
+//! 2002h: the trial of a new program (docs/update.md). The previous program is restored unless the new one is confirmed.
 
 use canopen::sdo::Abort;
 use canopen::{CanId, Duration, Frame, Instant};

@@ -39,7 +39,7 @@ pub struct RawSample {
     pub temperature: u32,
     /// Voltage reference in the chip.
     pub reference: u32,
-    /// Thermistor, with its resistor to the converter's supply; 0 if there is none.
+    /// Thermistor, with its resistor to the converter's supply; 0 without one.
     pub thermistor: u32,
     /// Conversions in each sum, at least 1.
     pub count: u16,

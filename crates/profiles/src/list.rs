@@ -252,7 +252,7 @@ macro_rules! personalities {
                 }
             }
 
-            /// Writes the state to be retained through a loss of power; `false` if there is none yet.
+            /// Writes the state to be retained through a loss of power; `false` without a state.
             #[inline(never)]
             pub fn retain(&self, words: &mut [u32; $crate::board::RETAINED_WORDS]) -> bool {
                 match &self.chain {

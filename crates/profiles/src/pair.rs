@@ -190,7 +190,7 @@ mod tests {
         fn update(&mut self, _: &Inputs, (): &mut ()) {}
     }
 
-    /// A profile that leaves what it was told at its own place in the image.
+    /// A profile that stores its calls at its own place in the image.
     struct Witness(usize);
 
     impl Profile for Witness {
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn both_are_told_of_a_sync_and_of_an_error() {
+    fn both_profiles_receive_syncs_and_errors() {
         let (mut pair, mut image) = (Pair::<Witness, Witness>::new(&(0, 1)), [0; 2]);
         pair.synchronised(Some(7), &mut image);
         assert_eq!(image, [7, 7]);

@@ -280,7 +280,7 @@ fn the_offset_is_the_one_nearest_to_zero() {
 }
 
 #[test]
-fn the_range_is_what_the_electronic_count_tells_apart() {
+fn the_range_is_that_of_the_electronic_count() {
     let mut parameters = with_sensor(SensorType::IncrementalCounted, 4096);
     parameters.sensors.channels[0].counted = NonZeroU16::new(10).unwrap();
     let car = Car::new(parameters, 0.0);
@@ -289,7 +289,7 @@ fn the_range_is_what_the_electronic_count_tells_apart() {
 }
 
 #[test]
-fn what_is_set_for_an_encoder_of_cia_406_does_not_count() {
+fn settings_of_an_encoder_of_cia_406_have_no_effect() {
     // The second sensor does not resolve the step of 1 mm.
     for resolution in [4096, 199] {
         let plain = with_sensor(SensorType::IncrementalCounted, resolution);

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_record_says_what_it_was_made_of() {
+    fn a_record_reads_back() {
         let record = DeviceRecord::new(5, 250, 3).unwrap();
         assert_eq!((record.node_id(), record.bit_rate_kbit(), record.personality()), (5, 250, 3));
         assert_eq!(record.encode(), [5, 3, 250, 0]);

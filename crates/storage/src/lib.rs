@@ -26,7 +26,7 @@
 //!
 //! A single-bank flash stops the core during an operation: 16 us for a word (100 us at most), 0.25 s for the erase of a
 //! page (0.5 s at most). A save therefore only programs. A page is erased by [`Store::prepare`] at start-up, before the
-//! node goes on the bus, and by [`Store::make_room`], which the caller calls when a pause of the core disturbs nobody.
+//! node joins the bus, and by [`Store::make_room`], which the caller calls when a pause of the core disturbs no service.
 //!
 //! `save` simply blocks and belongs in the lowest-priority task. All other tasks preempt it between two words: a 1 kHz
 //! sampling task starts late by one word at most and then runs at full speed, because nothing is programmed meanwhile.

@@ -71,7 +71,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// The pair of a start. `noise` makes the challenge different at each start; nobody can predict the challenge from
+    /// The pair of a start. `noise` makes the challenge different at each start; no observer can predict the challenge from
     /// the noise without the key.
     #[must_use]
     pub fn new(key: &[u8; KEY_LEN], noise: &[u32], serial_number: u32) -> Pair {
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_in_ram_comes_back() {
+    fn the_pair_in_ram_survives_a_reset() {
         let pair = Pair::new(&KEY, &[1], SERIAL);
         assert!(Pair::from_words(pair.words()) == pair);
     }

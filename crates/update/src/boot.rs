@@ -13,7 +13,7 @@ use crate::trial::{self, Trial};
 /// Inputs of the decision besides the flash.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Start {
-    /// The application was told to enter the bootloader (1F51h = 0 or 2).
+    /// A master has sent the application into the bootloader (1F51h = 0 or 2).
     pub stay: bool,
     /// Why the chip was reset.
     pub reset: Reset,

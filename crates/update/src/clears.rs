@@ -35,7 +35,7 @@ impl Clears {
         crate::crashes::sealed(self.0)
     }
 
-    /// The budget after so many intervals of operation.
+    /// The budget after this number of intervals of operation.
     #[must_use]
     pub fn refill(self, intervals: u8) -> Clears {
         Clears(self.0.saturating_sub(intervals))

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_ram_holds_after_power_up_counts_nothing() {
+    fn random_ram_after_power_up_counts_no_crash() {
         for word in [0, u32::MAX, 0x5555_5555, 0xFFFF_FF01, 3] {
             assert_eq!(Crashes::from_word(word).count(), 0);
         }

@@ -190,7 +190,7 @@ impl Header {
         self.certificate(rank)?.get(CERTIFIED_LEN - KEY_LEN..)?.first_chunk()
     }
 
-    /// What the key of this rank has signed as a certificate, and the signature; `None` for the release key, which signs
+    /// The bytes signed as a certificate by the key of this rank, and the signature; `None` for the release key, which signs
     /// the image.
     pub(crate) fn signed_by(&self, rank: Rank) -> Option<(&[u8], &[u8; SIGNATURE_LEN])> {
         let below = match rank {

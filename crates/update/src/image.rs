@@ -107,7 +107,7 @@ pub(crate) struct FullCheck {
 
 /// Number of verifications of each signature.
 const TWICE: u32 = 2;
-/// What each complete verification adds to the word, so that none can be left out.
+/// The constant that each complete verification adds to the word, so that none can be left out.
 const VERIFIED: u32 = 0x9E37_79B9;
 
 impl FullCheck {

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_told_apart() {
+    fn keys_are_distinguished() {
         let mut other = DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
         assert!(is_same(&other, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY));
         other[31] ^= 1;

@@ -28,7 +28,7 @@ const CAUSE: u32 = 40;
 const BEGUN: u32 = 48;
 const ENDED: u32 = 56;
 
-/// What became of a download.
+/// The outcome of a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The program is on trial.
@@ -47,7 +47,7 @@ pub enum Outcome {
     BrokenOff,
 }
 
-/// Who has decided on a trial.
+/// The decider of a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cause {
     /// Not known: the power failed at that moment.
@@ -112,7 +112,7 @@ impl fmt::Display for Cause {
 /// An event: the outcome, and the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
-    /// What became of the download.
+    /// The outcome of the download.
     pub outcome: Outcome,
     /// Version of the downloaded program, up to 255.255.255; 0 if its header did not arrive.
     pub version: Version,
@@ -121,7 +121,7 @@ pub struct Event {
 }
 
 impl Event {
-    /// The event that is not in the log yet; `None` if there is none. To be called by the application, after which
+    /// The event that is not in the log yet; `None` without one. To be called by the application, after which
     /// [`Event::settle`] takes note that the log has it.
     pub fn pending<F: Flash>(flash: &mut F, layout: &Layout) -> Option<Event> {
         if is_zero(flash, place(layout, ENDED), 0) || all_are(&word(flash, layout.staging().start()), 0xFF) {
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn every_event_comes_back() {
+    fn every_event_reads_back() {
         let status = Status { busy: false, code: 66, detail: 0x1234 };
         let causes = Cause::ALL;
         let outcomes = [Outcome::OnTrial, Outcome::Installed, Outcome::Failed, Outcome::BrokenOff];

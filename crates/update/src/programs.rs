@@ -1,4 +1,4 @@
-//! What the areas of an update tell about the programs of a node: for an object of the application.
+//! The programs in the areas of an update, for an object of the application.
 
 use crate::area::{Area, Layout};
 use crate::clears::Clears;

@@ -11,7 +11,7 @@
 //!
 //! A word is the unit of programming, 4 or 8 bytes. The two words that decide are zeros, because zeros may be
 //! programmed once more over a word that a cut left half programmed, and are then final. To revoke a record, zeros are
-//! programmed over all of it, the last word first. This comes before every erase of the area, so an erase that is cut
+//! programmed over the whole record, the last word first. This comes before every erase of the area, so an erase that is cut
 //! cannot bring a record back.
 
 use crate::flash::{Flash, all_are, first, program};
@@ -123,7 +123,7 @@ mod tests {
     const ZERO: [u8; 4] = [0; 4];
 
     #[test]
-    fn the_record_says_what_the_table_says() {
+    fn the_record_agrees_with_the_table() {
         let (first, second) = (*b"COPY", *b"THIS");
         for (words, says) in [
             ([ERASED; 4], Commit::None),
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_revoked_record_is_none_whatever_it_was() {
+    fn a_revoked_record_is_never_valid() {
         for (word, len) in [(4, 16), (8, 24)] {
             for write in [Record::write, Record::close, Record::done] {
                 let mut flash = MockFlash::with_words(&[64], word, 1);

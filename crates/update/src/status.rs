@@ -122,7 +122,7 @@ mod tests {
     ];
 
     #[test]
-    fn every_word_comes_back() {
+    fn every_word_reads_back() {
         for status in ALL.map(Status::refused).into_iter().chain([Status::GOOD, Status::BUSY]) {
             assert_eq!(Status::from_word(status.word()), status);
         }
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn the_detail_is_what_the_node_expects_or_a_count() {
+    fn the_detail_is_the_expected_value_or_a_count() {
         for (refusal, detail) in [
             (Refusal::Board { expected: 0x1234_5678 }, 0x5678),
             (Refusal::Hardware { revision: 3 }, 3),

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_encoded_decodes() {
+    fn an_encoded_frame_decodes() {
         for frame in [
             standard(0x2A5, &[1, 2, 3]),
             Frame::remote(StandardId::new(0x7FF).unwrap(), 8).unwrap(),

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_record_is_refused() {
+    fn lines_without_a_record_are_refused() {
         for line in [
             "",
             "(1.0) vcan0 123#00",

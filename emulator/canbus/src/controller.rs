@@ -100,7 +100,7 @@ pub trait Controller {
     /// A frame begins on the wire; with `transmitting` the frame is the one that `pending` returned.
     fn start_of_frame(&mut self, transmitting: bool, at: Time);
 
-    /// The controller's frame lost the arbitration; the controller goes on as a receiver.
+    /// The controller's frame lost the arbitration; the controller continues as a receiver.
     fn lost(&mut self, at: Time);
 
     /// The controller's frame was sent and acknowledged; `at` is the end of frame.

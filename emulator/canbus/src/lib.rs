@@ -58,7 +58,7 @@
 //! * Propagation takes no time, and a controller sees an edge in the quantum in which the edge comes. So the sample
 //!   point does not matter among participants with the same clock. With different clocks, every participant samples
 //!   where its [`BitTiming`] says and resynchronises.
-//! * A participant at another bit rate than the transmitter starts anew with each frame, and only its error flag can
+//! * A participant at another bit rate than the transmitter restarts with each frame, and only its error flag can
 //!   delay the next frame.
 //! * At most one overload frame follows a frame, and none follows an error frame. A participant waits until a disturbed
 //!   delimiter is over and does not count the disturbance as another error.

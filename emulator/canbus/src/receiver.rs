@@ -6,7 +6,7 @@ use crate::{BusError, Frame};
 /// The meaning of a bit for the receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Seen {
-    /// The frame goes on.
+    /// The frame continues.
     Nothing,
     /// The next bit is the ACK slot; with `true` the receiver acknowledges.
     AckSlotNext(bool),

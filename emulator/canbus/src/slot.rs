@@ -1,5 +1,5 @@
 //! The time from a start of frame to the end of its intermission. The course of the frame is computed at the start of
-//! frame; each participant is told of an event when its instant comes.
+//! frame; each participant receives an event at its instant.
 
 use std::collections::VecDeque;
 

@@ -10,7 +10,7 @@ const FLAG_BITS: u8 = 6;
 /// Recessive bits of the delimiter after the first one.
 const DELIMITER_BITS: u8 = 7;
 
-/// An event that a participant is told of.
+/// An event for a participant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Notice {
     Lost,

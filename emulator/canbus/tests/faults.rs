@@ -160,7 +160,7 @@ fn traffic_counts_for_the_recovery_from_bus_off() {
 
 /// A hidden bit may also be the start of frame of an error-passive transmitter, which no receiver ever notices.
 #[test]
-fn a_bus_that_destroys_every_frame_goes_on() {
+fn a_bus_that_destroys_every_frame_continues() {
     let mut nodes = [node(), node()];
     let mut bus = Bus::new();
     bus.faults.noise(1, 1.0);
@@ -224,7 +224,7 @@ fn an_error_passive_transmitter_lets_others_go_first() {
 }
 
 #[test]
-fn a_listener_at_another_bit_rate_disturbs_until_it_is_passive() {
+fn a_listener_at_another_bit_rate_disturbs_until_error_passive() {
     for rate in [125_000, 250_000, 500_000, 800_000] {
         let mut nodes = [node(), node(), HostNode::new(Time::of_cycle(rate))];
         let mut bus = Bus::new();

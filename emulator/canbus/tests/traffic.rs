@@ -199,7 +199,7 @@ fn a_silent_node_hears_but_does_not_acknowledge() {
 }
 
 #[test]
-fn a_babbler_fills_the_bus_as_far_as_it_is_told() {
+fn a_babbler_fills_the_bus_to_its_set_load() {
     for (load, range) in [(1.0, 0.9999..=1.0), (0.5, 0.49..=0.51), (0.05, 0.045..=0.055)] {
         let (mut babbler, mut a) = (Babbler::new(BIT, load, Babbler::foreign(), 1), HostNode::new(BIT));
         let mut bus = Bus::new();

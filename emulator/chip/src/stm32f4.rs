@@ -72,7 +72,7 @@ pub struct Stm32f4 {
     /// The cause of a reset that the chip itself has requested.
     pub(crate) asked: Option<Cause>,
     pub(crate) lines: IrqLines,
-    /// Whether deadline and lines were computed anew since the core's last query.
+    /// Whether deadline and lines were computed again since the core's last query.
     pub(crate) has_settled: bool,
     pub(crate) deadline: Time,
 }

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn instructions_take_what_the_manual_says() {
+    fn instructions_take_the_cycles_of_the_manual() {
         for (op, cycles_of_it, name) in [
             (0x1C40, [1, 1, 1], "adds r0, r0, #1"),
             (0x6808, [1, 2, 2], "ldr r0, [r1]"),

@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn instructions_take_what_the_manual_says() {
+    fn instructions_take_the_cycles_of_the_manual() {
         for (op, cycles_of_it, name) in [
             (0xED90_0A32, 2, "vldr s0, [r0, #200]"),
             (0xED9F_0A10, 2, "vldr s0, [pc, #64]"),

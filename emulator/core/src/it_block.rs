@@ -1,6 +1,6 @@
 //! The IT state: which condition the next instructions of an IT block depend on (ARMv7-M, A7.3).
 //!
-//! It is a byte. The upper half is the condition of the next instruction; of the lower half each bit is the last bit of the condition of
+//! The state is a byte. The upper half is the condition of the next instruction; each bit of the lower half is the last bit of the condition of
 //! one more instruction, and the lowest bit that is set ends the block. An IT instruction holds the byte that the first of its block
 //! begins with.
 

@@ -23,7 +23,7 @@ pub struct Activity {
     last_cycles: u64,
     /// Longest time from the request to the first instruction.
     pub worst_latency: Time,
-    /// Longest part of it in which neither this exception nor one of the same or a higher priority ran: less urgent code that
+    /// Longest part of this time in which neither this exception nor one of the same or a higher priority ran: less urgent code that
     /// masks it, and waits for the flash.
     pub worst_blocking: Time,
     /// Longest time from the request to the end of the activation that serves it.

@@ -221,7 +221,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::store(&mut self.cpu, address, original)
     }
 
-    /// Goes on up to this instruction of the IT block that is next, so that a fault can come between two instructions of the block.
+    /// Continues up to this instruction of the next IT block, so that a fault can come between two instructions of the block.
     /// Does nothing for an instruction outside of the block, and for the IT instruction.
     ///
     /// # Errors

@@ -63,7 +63,7 @@ fn result(machine: &mut Machine<Stm32f4>) -> [u8; 2] {
 }
 
 #[test]
-fn a_program_that_is_only_watched_does_what_it_does() {
+fn a_watched_program_is_not_changed() {
     let mut machine = machine(&[]);
     assert_eq!(result(&mut machine), [3, 0]);
     let visits = machine.visits();
@@ -73,7 +73,7 @@ fn a_program_that_is_only_watched_does_what_it_does() {
 }
 
 #[test]
-fn one_moment_goes_on_in_many_ways() {
+fn one_state_continues_with_many_faults() {
     let mut machine = machine(&[COMPARE, IT]);
     assert_eq!(run(&mut machine), Stop::Watched);
     assert_eq!(machine.stopped(), Some(Point { address: COMPARE, visit: 1 }));
@@ -98,7 +98,7 @@ fn one_moment_goes_on_in_many_ways() {
 }
 
 #[test]
-fn each_instruction_of_an_it_block_can_be_skipped() {
+fn every_instruction_of_an_it_block_can_be_skipped() {
     let mut machine = machine(&[IT]);
     assert_eq!(run(&mut machine), Stop::Watched);
     machine.unwatch().unwrap();
@@ -157,7 +157,7 @@ fn each_flag_is_the_one_that_its_conditions_read() {
 }
 
 #[test]
-fn a_fault_can_come_between_the_instructions_of_an_it_block() {
+fn a_fault_can_be_injected_between_instructions_of_an_it_block() {
     let mut machine = machine(&[IT]);
     assert_eq!(run(&mut machine), Stop::Watched);
     machine.unwatch().unwrap();

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_saved_is_loaded_and_nodes_are_apart() {
+    fn saved_flash_is_loaded_for_its_own_node() {
         let dir = dir("roundtrip");
         assert_eq!(load(&dir, 5, CHIP).unwrap(), None);
         save(&dir, 5, &vec![0xA5; SIZE]).unwrap();

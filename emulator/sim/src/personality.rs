@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_read_as_it_is_written() {
+    fn a_written_name_reads_back() {
         for personality in Personality::ALL {
             assert_eq!(personality.to_string().parse(), Ok(personality));
         }

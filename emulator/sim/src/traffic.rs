@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_message_of_a_node_is_passed_over() {
+    fn messages_without_a_node_are_ignored() {
         let mut traffic = Traffic::default();
         for (id, bytes) in [(0x000, &[1u8, 5][..]), (0x080, &[]), (0x705, &[]), (0x085, &[1]), (0x7E5, &[4])]
         {

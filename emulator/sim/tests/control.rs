@@ -78,7 +78,7 @@ fn a_line_is_a_command_and_a_line_the_answer() {
 }
 
 #[test]
-fn who_watches_is_told_of_the_changes_of_others() {
+fn watchers_receive_the_changes_of_other_clients() {
     let mut bench = Bench::new();
     let (mut watcher, mut other) = (bench.connect(), bench.connect());
     bench.ask(&mut watcher, "watch").unwrap();

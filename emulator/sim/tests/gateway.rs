@@ -93,7 +93,7 @@ fn clients_of_both_protocols_hear_each_other() {
 }
 
 #[test]
-fn a_silent_client_at_the_wrong_bit_rate_disturbs_nobody_but_an_active_one_does() {
+fn an_active_client_at_the_wrong_bit_rate_disturbs_and_a_silent_one_does_not() {
     let mut bench = Bench::new();
     let (socketcand, slcan) = (bench.serve(Protocol::Socketcand), bench.serve(Protocol::Slcan));
     let mut one = bench.raw_client(socketcand);
@@ -160,7 +160,7 @@ fn a_browser_sends_no_frames() {
 /// Frames that a client has sent before it closed its connection reach the bus, over both protocols: six times `nmt
 /// start`.
 #[test]
-fn what_was_sent_before_the_end_reaches_the_bus() {
+fn frames_sent_before_the_end_reach_the_bus() {
     let mut bench = Bench::new();
     let (socketcand, slcan) = (bench.serve(Protocol::Socketcand), bench.serve(Protocol::Slcan));
     let mut client = bench.raw_client(socketcand);

@@ -1,5 +1,5 @@
 //! An update under the actions of a master, noise and power cuts. The node runs image A and is sent image B. In any
-//! case the node starts A or B, complete: nobody without the owner's key can sign a third image.
+//! case the node starts A or B, complete: without the owner's key no one can sign a third image.
 
 use std::sync::LazyLock;
 

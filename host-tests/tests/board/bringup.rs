@@ -102,9 +102,9 @@ fn each_fault_of_the_hardware_is_named() {
     assert_eq!(wrong, [""; 0]);
 }
 
-/// A run that was interrupted goes on with the first step that is not green.
+/// An interrupted run continues with the first step that is not green.
 #[test]
-fn a_second_run_goes_on_at_the_step_that_was_red() {
+fn a_second_run_continues_at_the_failed_step() {
     let fault = faults::ALL.iter().find(|fault| fault.name.contains("ppm")).unwrap();
     let chosen: Vec<_> = steps::ALL[..4].iter().collect();
     let mut report = Report::default();

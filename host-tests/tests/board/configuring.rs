@@ -110,7 +110,7 @@ fn fastscan(world: &mut World, master: &Master) -> Option<[u32; 4]> {
 }
 
 #[test]
-fn three_nodes_without_a_node_id_are_found_by_fastscan_and_keep_what_they_are_given() {
+fn three_nodes_without_a_node_id_are_found_by_fastscan_and_keep_their_new_ids() {
     let mut world = world("--bitrate 500 --node 201:pressure --node 202:pressure --node 203:pressure");
     let master = Master::join_at(&mut world, 500_000);
     world.run_until(SECOND);
@@ -165,7 +165,7 @@ fn lss_moves_a_node_to_another_bit_rate_for_good() {
 
 /// At every bit rate, on a bus with a frame every 50 ms that other nodes acknowledge.
 #[test]
-fn a_node_finds_the_bit_rate_by_listening_and_disturbs_nobody() {
+fn a_node_detects_the_bit_rate_without_disturbing_the_bus() {
     for rate in [10, 20, 50, 125, 250, 500, 800, 1000] {
         let mut world = world(&format!("--bitrate {rate} --node 1:pressure --node 5:pressure@auto"));
         let master = Master::join_at(&mut world, rate * 1000);
@@ -222,7 +222,7 @@ fn device_type(world: &mut World, master: &Master) -> Vec<u8> {
 }
 
 #[test]
-fn a_node_is_what_it_is_told_to_be_on_the_command_line_and_then_by_sdo() {
+fn a_node_has_the_personality_of_the_command_line_and_then_that_of_sdo() {
     let types = [0x0002_0194_u32, 0x0005_0196, 0xFFFF_0196, 0x0000_01A1].map(u32::to_le_bytes);
     for (number, name) in ["pressure", "encoder", "combined", "lift"].into_iter().enumerate() {
         let mut world = world(&format!("--bitrate 1000 --node 1:{name}"));

@@ -25,7 +25,7 @@ fn content_of(name: &str, key: SigningKey, others: &[SigningKey]) -> Result<Cont
 
 /// The first line says which bootloader is written and what it starts. With the three keys of an owner it is the owner's.
 #[test]
-fn the_first_line_names_the_bootloader_and_what_it_starts() {
+fn the_first_line_names_the_bootloader_and_its_programs() {
     let first_line = |content: Content| content.to_string().lines().next().unwrap().to_owned();
     let development = first_line(content(key::development()).unwrap());
     assert_eq!(
@@ -58,7 +58,7 @@ fn emulated() -> Vec<u8> {
 }
 
 #[test]
-fn a_board_on_a_bench_gets_what_the_emulated_board_has() {
+fn a_flashed_board_has_the_flash_of_the_emulated_board() {
     let emulated = emulated();
     let mut written = vec![0xFF; emulated.len()];
     for part in content(key::development()).unwrap().parts() {
@@ -80,7 +80,7 @@ fn range_and_crc(line: &str) -> Option<(Range<usize>, u32)> {
 }
 
 #[test]
-fn a_dry_run_says_the_ranges_and_what_is_in_them() {
+fn a_dry_run_prints_the_ranges_with_their_contents() {
     let says = content(key::development()).unwrap().to_string();
     let emulated = emulated();
     let parts: Vec<_> = says.lines().filter_map(range_and_crc).collect();

@@ -105,7 +105,7 @@ fn a_controller_that_does_not_leave_the_bus_is_reset() {
     assert!(log(&mut world).contains("lost events of kind 9: 1"));
 }
 
-/// A FIFO that releases no mailbox for 20 ms: the interrupt does not wait for it, the node goes on and counts it.
+/// A FIFO that releases no mailbox for 20 ms: the interrupt does not wait for it, the node continues and counts the event.
 #[test]
 fn a_mailbox_that_is_released_late_costs_no_reset() {
     const LATE: u32 = 36_000 * 20;

@@ -52,7 +52,7 @@ fn a_small_lift() {
     assert!(lift.doors_are(car::WIDTH) && !lift.is_lit());
 
     too_many_people(&mut lift);
-    somebody_in_the_door(&mut lift);
+    a_person_in_the_door(&mut lift);
     up_and_down(&mut lift);
 
     every_frame_is_known(&lift.log);
@@ -75,7 +75,7 @@ fn too_many_people(lift: &mut SmallLift) {
 }
 
 /// A person leaves the car slowly: the doors open again.
-fn somebody_in_the_door(lift: &mut SmallLift) {
+fn a_person_in_the_door(lift: &mut SmallLift) {
     lift.load(640.0);
     assert_eq!(lift.last(0x188, 0) & u64::from(OVERLOAD), 0);
     lift.run_until(500, |lift| !lift.doors_are(car::WIDTH));

@@ -1,5 +1,5 @@
 //! No two modules of different folders depend on each other, directly or through a third module, so that the effects of
-//! a change are known. In the CANopen library, this holds for the files beside `lib.rs` too. The dependencies are read
+//! a change are known. In the CANopen library, this is true for the files beside `lib.rs` too. The dependencies are read
 //! from the `use` lines of every crate. A name that `lib.rs` re-exports counts as one of its module; a re-export
 //! (`pub use`) of a folder is no dependency.
 
@@ -220,7 +220,7 @@ fn no_file_of_the_library_needs_itself_by_way_of_another() {
 }
 
 #[test]
-fn the_graph_is_what_the_files_say() {
+fn the_graph_agrees_with_the_files() {
     let graph = graph(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/profiles/src")));
     let uses = |folder: &str, other: &str| graph[folder].contains(other);
     assert!(uses("lift", "encoder") && uses("lift/objects", "pressure") && uses("combined", "pair"));

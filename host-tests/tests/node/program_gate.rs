@@ -25,7 +25,7 @@ const EFFECTS: [(u16, u8, &str); 7] = [
     (0x2002, 4, "the time after which it is confirmed"),
 ];
 
-/// A measuring node with a key and a program on trial, ten seconds after nobody has spoken to it.
+/// A measuring node with a key and a program on trial, after ten seconds without a frame for it.
 fn guarded(personality: Personality) -> Bench {
     let mut bench = Bench::booted_as(personality);
     let pair = Pair::new(&KEY, &[1], SERIAL);
@@ -109,9 +109,9 @@ fn the_holder_of_the_key_may_write_them() {
     }
 }
 
-/// A stranger writes every entry, sends NMT commands and heartbeats: the trial ends as if nobody had spoken.
+/// A stranger writes every entry, sends NMT commands and heartbeats: the trial ends as without these frames.
 #[test]
-fn a_stranger_neither_confirms_a_program_nor_takes_it_back() {
+fn a_stranger_neither_confirms_nor_rolls_back_a_program() {
     for personality in Personality::ALL {
         let mut bench = guarded(personality);
         bench.nmt(1);

@@ -143,7 +143,7 @@ fn off_the_bus_and_without_a_measurement_nothing_is_confirmed() {
 }
 
 #[test]
-fn without_a_master_the_program_before_comes_back_in_time_or_the_new_one_is_confirmed_by_itself() {
+fn without_a_master_the_program_is_rolled_back_or_confirmed_in_time() {
     for (limit, automatic, seconds, then) in [
         (600, 0, 599.9, None),
         (600, 0, 600.0, Some(Verdict::TakeBack(Cause::Time))),
@@ -159,7 +159,9 @@ fn without_a_master_the_program_before_comes_back_in_time_or_the_new_one_is_conf
 
 #[test]
 fn a_master_ends_the_trial_by_command_and_gets_its_answer_first() {
-    for (word, then) in [(b"conf", Verdict::Confirm(Cause::Command)), (b"back", Verdict::TakeBack(Cause::Command))] {
+    for (word, then) in
+        [(b"conf", Verdict::Confirm(Cause::Command)), (b"back", Verdict::TakeBack(Cause::Command))]
+    {
         let mut bench = on_trial();
         assert_eq!(state(&mut bench), 1);
         bench.write(0x2002, COMMAND, word).unwrap();

@@ -24,7 +24,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// That of a real board.
+    /// The bus of a real board.
     pub const FULL: Effort = Effort { seconds: 60, frames: 10_000, times: 20 };
     /// A first look.
     pub const SHORT: Effort = Effort { seconds: 5, frames: 60, times: 3 };
@@ -100,7 +100,7 @@ impl Bench<'_> {
     /// Has the user do something; notes it when it was skipped.
     ///
     /// # Errors
-    /// There is nobody to ask.
+    /// No operator is there.
     pub fn by_hand(&mut self, action: Action) -> Result<bool> {
         let is_done = self.desk.by_hand(action)?;
         if !is_done {

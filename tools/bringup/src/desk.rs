@@ -1,4 +1,4 @@
-//! What a step can use: the debug probe, the CAN adapter, the files that were flashed, and the hands of the user.
+//! The means of a step: the debug probe, the CAN adapter, the files that were flashed, and the hands of the user.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub trait Desk {
     /// The probe does not reset it.
     fn reset(&mut self) -> Result<()>;
 
-    /// Attaches to the log for a time. Lines since the last reset that nobody has read come first.
+    /// Attaches to the log for a time. Unread lines since the last reset come first.
     ///
     /// # Errors
     /// The probe does not attach.
@@ -46,10 +46,10 @@ pub trait Desk {
     /// Has the user do something, and waits for the end. `false`: the user has skipped it.
     ///
     /// # Errors
-    /// There is nobody to ask.
+    /// No operator is there.
     fn by_hand(&mut self, action: Action) -> Result<bool>;
 
-    /// What was written to the flash.
+    /// The content written to the flash.
     fn programs(&self) -> &[Part];
 
     /// The signed image of the application.
@@ -59,12 +59,12 @@ pub trait Desk {
 /// Something that only hands can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
-    /// The supply is off for so many seconds.
+    /// The supply is off for this number of seconds.
     PowerCycle {
         /// The time without supply.
         seconds: f64,
     },
-    /// The receive pin of the chip is tied to ground for so many seconds.
+    /// The receive pin of the chip is tied to ground for this number of seconds.
     HoldReceive {
         /// The time.
         seconds: u32,

@@ -19,7 +19,7 @@ use programmer::probe::Board;
 
 /// Takes a board with the images of `cargo xtask flash` through fifteen steps, and writes a report.
 ///
-/// It stops at the first failure and says what to do. The next run goes on there.
+/// The run stops at the first failure with the remedy. The next run continues there.
 #[derive(Parser)]
 #[command(name = "cargo xtask bringup", version)]
 struct Cli {

@@ -1,4 +1,4 @@
-//! The desk with a board: probe-rs, a CAN adapter, and somebody at the keyboard.
+//! The desk with a board: probe-rs, a CAN adapter, and an operator at the keyboard.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ pub struct RealDesk {
     pub address: Address,
     /// The bus.
     pub network: Network,
-    /// What was written to the flash.
+    /// The content written to the flash.
     pub programs: Vec<Part>,
     /// The signed image.
     pub image: Image,

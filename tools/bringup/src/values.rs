@@ -56,7 +56,7 @@ pub const COMMANDS: [(u8, &str, &str); 4] = [
     (0xF3, "panic", "the last run ended in a panic"),
 ];
 
-/// What a write to 2005h has to be.
+/// The value of a write to 2005h.
 #[must_use]
 pub const fn selection(number: u8) -> [u8; 4] {
     (KEY | number as u32).to_le_bytes()

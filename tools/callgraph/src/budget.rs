@@ -32,7 +32,7 @@ impl Budget {
         if compiler.is_measured { self.limit } else { self.limit + self.limit * self.width / 100 }
     }
 
-    /// Whether a value is within the budget. The line tells the value, the budget and the compiler.
+    /// Whether a value is within the budget. The line has the value, the budget and the compiler.
     ///
     /// # Errors
     /// The same line, when the value is over the budget. Also when the value is 0: then nothing was measured.
@@ -111,12 +111,12 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_measured_is_within_no_budget() {
+    fn a_missing_measurement_is_within_no_budget() {
         assert!(BUDGET.check(0, &Compiler::new(MEASURED_WITH)).is_err());
     }
 
     #[test]
-    fn the_line_tells_which_compiler_was_seen() {
+    fn the_line_names_the_compiler() {
         let line = BUDGET.check(5, &Compiler::new("1.99.0")).unwrap();
         assert_eq!(line, "flash, bytes: 5, budget 1100 with rustc 1.99.0 (the budgets are those of 1.96.0)");
     }

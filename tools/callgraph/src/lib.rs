@@ -1,4 +1,4 @@
-//! Reads the images as they are flashed: which calls lead to a panic, and how deep the stack can get.
+//! Reads the flashed images: which calls lead to a panic, and how deep the stack can get.
 //!
 //! Both answers come from one graph. The instructions are decoded (capstone), and every branch out of a function is a
 //! way into another function. A call through a register counts as a call of the constant that was put into the

@@ -112,7 +112,7 @@ fn default(value: DefaultValue) -> Option<Formula> {
     })
 }
 
-/// The access type of a row. For a parameter that a PDO carries, the access type tells the direction of the PDO,
+/// The access type of a row. For a parameter that a PDO carries, the access type is the direction of the PDO,
 /// because CiA 306 has no other place for the direction.
 fn access(row: &Row) -> Access {
     match (row.access, row.mapping) {

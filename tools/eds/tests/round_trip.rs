@@ -15,7 +15,7 @@ fn default(eds: &Eds, index: u16, sub: u8) -> Value {
 }
 
 #[test]
-fn every_device_is_read_as_it_was_written() {
+fn every_device_reads_back() {
     for device in &DEVICES {
         let mut written = device.eds();
         // Units are comments, which the reader skips.
@@ -103,9 +103,9 @@ fn the_text_is_ascii_with_dos_line_ends() {
     }
 }
 
-/// What a configuration leaves out: commands, what makes the device act, and the calibration.
+/// Entries that a configuration leaves out: commands, what makes the device act, and the calibration.
 #[test]
-fn commands_are_excluded_from_a_download_and_what_is_stored_is_not() {
+fn commands_are_excluded_from_a_download_and_stored_values_are_not() {
     for device in &DEVICES {
         let eds = Eds::parse(&device.sheet(&Edition::default())).unwrap();
         for row in device.rows.iter().filter(|row| row.access.is_writable()) {

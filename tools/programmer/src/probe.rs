@@ -11,7 +11,7 @@ const OLDEST: (u32, u32) = (0, 25);
 /// Refuses a probe-rs that is missing or too old.
 ///
 /// # Errors
-/// What is wrong, in a line.
+/// The mistake, in a line.
 pub fn check_version() -> Result<(), String> {
     let output = Command::new("probe-rs").arg("--version").output();
     let output = output.map_err(|error| format!("cannot start probe-rs (https://probe.rs): {error}"))?;
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_old_probe_rs_is_told_from_a_new_one() {
+    fn an_old_probe_rs_is_rejected() {
         assert_eq!(version("probe-rs 0.29.1 (git commit: abc)"), Some((0, 29)));
         assert!(version("probe-rs 0.24.0").unwrap() < OLDEST && version("probe-rs 1.0.0").unwrap() > OLDEST);
         assert_eq!(version("something"), None);

@@ -40,7 +40,7 @@ fn flash() -> MockFlash {
 }
 
 #[test]
-fn a_node_runs_what_the_development_key_signs_up_to_the_longest_image() {
+fn a_node_runs_images_of_the_development_key_up_to_the_longest() {
     for len in [4, 10_000, code::most()] {
         let code = (0..len).map(|i| (i * 7 + i / 256) as u8).collect();
         let image = Image::sign(description(), code, &key::development()).unwrap();
@@ -51,7 +51,7 @@ fn a_node_runs_what_the_development_key_signs_up_to_the_longest_image() {
 }
 
 #[test]
-fn a_node_refuses_what_another_key_signs() {
+fn a_node_refuses_images_of_another_key() {
     let image = Image::sign(description(), vec![1; 64], &key::random().unwrap()).unwrap();
     assert_eq!(update(&mut flash(), &image.to_bytes()).code, 67);
 }
@@ -73,7 +73,7 @@ fn the_development_key_is_the_one_in_the_file_and_in_the_bootloader() {
 }
 
 #[test]
-fn a_key_comes_back_from_its_file_and_is_never_overwritten() {
+fn a_key_file_reads_back_and_is_never_overwritten() {
     let path = std::env::temp_dir().join(format!("sign-test-{}.pem", std::process::id()));
     let key = key::random().unwrap();
     key::write(&key, &path).unwrap();
@@ -83,7 +83,7 @@ fn a_key_comes_back_from_its_file_and_is_never_overwritten() {
 }
 
 #[test]
-fn an_image_comes_back_from_its_file() {
+fn an_image_file_reads_back() {
     let image = Image::sign(description(), vec![5; 400], &key::development()).unwrap();
     let bytes = image.to_bytes();
     let again = Image::read(&bytes).unwrap();
@@ -128,7 +128,7 @@ fn segments_of_an_elf_file_lie_where_they_are_loaded() {
 }
 
 #[test]
-fn what_is_no_application_is_refused() {
+fn a_file_without_an_application_is_refused() {
     let (start, end) = (code::start(), code::start() + u32::try_from(code::most()).unwrap());
     for (file, words) in [
         (elf(&[segment(0, 0x0800_0000, 16)]), "outside of the application area"),
@@ -149,7 +149,7 @@ fn what_is_no_application_is_refused() {
 
 /// A bootloader with the development key in all ranks takes an image of the release key that the list certifies.
 #[test]
-fn a_node_runs_what_the_release_key_of_a_key_list_signs() {
+fn a_node_runs_images_of_the_release_key_of_a_key_list() {
     let (by, root, release) = (key::development(), key::random().unwrap(), key::random().unwrap());
     let roots = key_list::with_root(&root.verifying_key(), 1, &by).unwrap();
     let of_root = key_list::with_release(roots, &release.verifying_key(), 2, 0, &root).unwrap();

@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_client_may_not_send() {
+    fn lines_forbidden_to_clients() {
         for message in [
             "send 123 8",
             "send 800 0",

@@ -183,7 +183,7 @@ mod tests {
         }
     }
 
-    /// VDDA is 3.3 V; an input has the whole of it at most.
+    /// VDDA is 3.3 V; an input has at most this voltage.
     #[test]
     fn no_input_is_above_vdda() {
         for (feature, board) in ALL {

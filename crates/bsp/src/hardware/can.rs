@@ -37,7 +37,7 @@ pub(crate) fn registers() -> &'static can1::RegisterBlock {
 
 /// Takes the controller off the bus at once, even in the middle of a frame, until the next reset of the chip.
 pub(super) fn hold_in_reset() {
-    // SAFETY: the program has ended, so nobody else writes the register.
+    // SAFETY: the program has ended, so no other code writes the register.
     unsafe { (*RCC::ptr()).apb1rstr().modify(|_, reset| reset.can1rst().set_bit()) };
 }
 
@@ -59,7 +59,7 @@ impl Controller {
         (Controller { can, losses }, Transmitter::new())
     }
 
-    /// Goes on the bus, or restarts on the bus: drops the content of the mailboxes and takes new timing and filters.
+    /// Joins the bus, or restarts on the bus: drops the content of the mailboxes and takes new timing and filters.
     /// Error counters start from zero. The function does not wait for the bus, because a stuck bus must not keep the
     /// node from starting.
     pub fn start(&mut self, timing: BitTiming, banks: &[Bank]) {

@@ -133,7 +133,7 @@ pub fn forget_authorisation() {
     mark.store(0, Ordering::Relaxed);
 }
 
-/// What the run before has left of the erase budget; `None` after a loss of power.
+/// The rest of the erase budget of the run before; `None` after a loss of power.
 #[must_use]
 pub fn erase_budget() -> Option<u16> {
     let [budget, complement] = load(&RETAINED.erase_budget);

@@ -14,7 +14,7 @@ use super::start_tests;
 use super::{retained, sampling, ssi};
 use crate::oversampling::WORDS;
 
-/// What the program has seen since its start. Written by one task each.
+/// Observations of the program since its start. Written by one task each.
 pub(super) static SEEN: Seen = Seen {
     reset_flags: AtomicU32::new(0),
     peaks: AtomicU32::new(0),
@@ -38,7 +38,7 @@ pub(super) struct Seen {
     longest_erase: AtomicU32,
 }
 
-/// What the tests at the start have found. Written before the tasks run, apart from the stack.
+/// Results of the tests at the start. Written before the tasks run, apart from the stack.
 pub(super) static FOUND: Found = Found {
     lsi: AtomicU32::new(0),
     loop_back: AtomicU32::new(0),

@@ -10,7 +10,7 @@ use canopen::{Action, BusEvent, Definition, Device, Frame, Instant, Job, Next};
 
 use super::Bus;
 
-/// What a product does beside its device.
+/// The work of a product beside its device.
 pub(crate) trait Product {
     /// The device of the product.
     type Definition: Definition;

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_supervisor_tells_what_is_new_and_what_is_missing() {
+    fn a_supervisor_reports_new_and_missing_nodes() {
         let [a, b, c] = [5, 6, 7].map(|id| NodeId::new(id).unwrap());
         let mut supervisor = Supervisor::<2>::new();
         assert!(supervisor.watch(a, Duration(100)) && supervisor.watch(b, Duration(200)));

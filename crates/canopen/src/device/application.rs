@@ -148,7 +148,7 @@ pub trait Application {
     }
 
     /// Whether a job can be stored now. Asked before the effect of every request that stores values. A job that runs
-    /// does not count: the answer must hold for one job more.
+    /// does not count: the answer must be valid for one more job.
     ///
     /// # Errors
     /// The reason to refuse the request, for example [`Abort::DeviceState`] while the memory has no room.

@@ -1,4 +1,4 @@
-//! What a device is made of: its application, the room for its objects, and its services.
+//! The parts of a device: its application, the room for its objects, and its services.
 
 use super::Application;
 use super::inner::Inner;

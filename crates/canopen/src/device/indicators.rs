@@ -1,4 +1,4 @@
-//! What the indicators of CiA 303-3 show.
+//! The states of the indicators of CiA 303-3.
 
 use super::{Definition, Device};
 use crate::emcy::Fault;

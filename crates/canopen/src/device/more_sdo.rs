@@ -87,7 +87,7 @@ impl<D: Definition> Inner<D> {
         self.channel_ids(SERVERS + (number as u16 & 0x7F))
     }
 
-    /// The CAN-IDs of further servers, of clients and of consumed EMCYs. The compiler removes all of it where the rows
+    /// The CAN-IDs of further servers, of clients and of consumed EMCYs. The compiler removes all of them where the rows
     /// have none of them.
     pub(super) fn more_service_ids(&self) -> impl Iterator<Item = CanId> {
         let mut ids = self.emcy_ids().chain(self.server_requests()).chain(self.client_responses());

@@ -46,7 +46,7 @@ impl Scope {
 pub(super) struct Pending {
     /// An action waits to be handed over.
     pub(super) is_waiting: bool,
-    /// The scope of the next start. The caller is told once (`reset_is_new`).
+    /// The scope of the next start. The caller is informed once (`reset_is_new`).
     reset: Reset,
     reset_is_new: bool,
     identifiers: bool,

@@ -18,7 +18,7 @@ pub(crate) struct Attributes {
     pub(crate) node_relative: bool,
 }
 
-/// What the device treats differently of a data type, apart from its size.
+/// Properties of a data type that the device treats differently, apart from its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Kind {

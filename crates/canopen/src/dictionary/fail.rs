@@ -60,7 +60,7 @@ pub(crate) const fn fail(index: u16, sub: u8, message: &str) -> ! {
     }
 }
 
-/// Stops the compilation unless the condition holds for the row. A macro, because the compiler evaluates a call much
+/// Stops the compilation unless the row meets the condition. A macro, because the compiler evaluates a call much
 /// slower than a condition, and there are a dozen conditions for each row.
 macro_rules! require {
     ($condition:expr, $row:expr, $message:expr $(,)?) => {

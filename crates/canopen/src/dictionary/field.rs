@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn every_type_reads_what_it_has_written() {
+    fn every_type_reads_back_its_values() {
         let field = |size| Field { offset: 3, size };
         let mut image = [0; 12];
         field(1).set_i8(&mut image, -3);

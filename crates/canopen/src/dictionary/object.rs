@@ -92,7 +92,7 @@ pub struct Object {
     pub default: DefaultValue,
     /// The group with which the value is stored; `None` for a value that no job stores.
     pub group: Option<Group>,
-    /// Physical unit, for documents; empty where there is none.
+    /// Physical unit, for documents; empty without a unit.
     pub unit: &'static str,
     /// The behaviour of the entry beyond holding a value. Only the methods below set it, so that no row of CiA 301 loses
     /// its rule.

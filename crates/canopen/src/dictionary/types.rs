@@ -40,7 +40,7 @@ pub enum Type {
     Unsigned64,
     /// REAL32, a finite number. Infinities and NaN are refused: as a default they do not compile, a download gets the
     /// abort code 0609 0030h, a PDO leaves them out, and stored values with them count as damaged. The application may
-    /// write them to the image, for example to mark a measured value as invalid; they are sent as they are.
+    /// write them to the image, for example to mark a measured value as invalid; they are sent without a change.
     Real32,
     /// REAL64. Every value is accepted, infinities and NaN too. [`Object::real64`](super::Object::real64) sets its default.
     Real64,

@@ -157,7 +157,7 @@ mod tests {
     const DOUBLE: Variable<f64> = DICTIONARY.variable(0x2000, 7);
 
     #[test]
-    fn a_variable_reads_what_it_has_written_and_leaves_its_neighbours() {
+    fn a_variable_reads_back_and_leaves_its_neighbours() {
         let mut image = [0; 29];
         assert_eq!(DICTIONARY.image_size(), image.len());
         FLAG.set(&mut image, 1);

@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn the_register_tells_communication_from_the_rest() {
+    fn the_register_distinguishes_communication_from_other_errors() {
         let conditions = [Condition { register: 0b100, ..Condition::new(0x3110) }];
         let of = |fault| {
             let mut set = FaultSet::default();

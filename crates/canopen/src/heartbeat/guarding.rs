@@ -13,7 +13,7 @@ pub(crate) struct Guarding {
     toggle: u8,
     /// Guard time (100Ch) times life time factor (100Dh) in ms; 0 for no life guarding.
     life_time: u32,
-    /// What follows after `due` of the present life time, in ms: a life time can be longer than a span.
+    /// The rest of the present life time after `due`, in ms: a life time can be longer than a span.
     rest: u32,
     due: Tick,
     is_lost: bool,
@@ -50,7 +50,7 @@ impl Guarding {
         (answer, core::mem::take(&mut self.is_lost))
     }
 
-    /// The end of the next part of the life time; `NEVER` when nothing is left of it.
+    /// The end of the next part of the life time; `NEVER` at its end.
     fn next_part(&mut self, now: Tick) -> Tick {
         let part = u16::try_from(self.rest).unwrap_or(u16::MAX);
         self.rest -= u32::from(part);

@@ -13,7 +13,7 @@ use core::marker::PhantomData;
 
 /// The share: `SHARE` / 4 of the bus.
 const SHARE: u32 = 3;
-/// A burst: the share of so many microseconds, and a PDO.
+/// A burst: the share of this number of microseconds, and a PDO.
 const BURST: u32 = 12_000;
 /// Time in microseconds after which the credit is full at every bit rate.
 const FULL_AFTER: u32 = 50_000;
@@ -130,7 +130,7 @@ const fn cost(len: usize) -> u32 {
     bits * 1000
 }
 
-/// What a product has chosen. The compiler removes the code of the rest.
+/// The choice of a product. The compiler removes the code of the rest.
 pub(crate) trait Choices {
     /// Some TPDOs send events.
     const SENDS_EVENTS: bool;

@@ -93,7 +93,7 @@ fn fastscan_finds_the_lowest_identity_and_selects_it() {
 }
 
 #[test]
-fn fastscan_of_nobody_finds_nobody() {
+fn fastscan_without_a_slave_finds_none() {
     assert_eq!(run(Fastscan::new(OPTIONS), &mut Slaves::new(&[], 0..0)), Ok(None));
 }
 
@@ -111,14 +111,14 @@ fn a_lost_answer_costs_time_and_nothing_else() {
 }
 
 #[test]
-fn silence_is_told_after_the_retries() {
+fn silence_is_reported_after_the_retries() {
     let mut slaves = Slaves::new(&[], 0..0);
     let error = run(lss::store(OPTIONS), &mut slaves).unwrap_err();
     assert_eq!((error, error.to_string().as_str()), (Error::NoAnswer(Name::Store), "LSS store: no answer"));
 }
 
 #[test]
-fn a_scan_tells_how_far_it_has_come() {
+fn a_scan_reports_its_progress() {
     let mut slaves = Slaves::new(&[5], 0..0);
     let (mut scan, mut now, mut asked) = (Fastscan::new(OPTIONS), Instant(0), vec![]);
     loop {

@@ -159,7 +159,7 @@ fn a_request_that_is_not_understood_is_refused_whatever_object_is_named() {
 }
 
 #[test]
-fn silence_costs_the_time_outs_and_tells_the_server() {
+fn silence_takes_the_time_outs_and_aborts_at_the_server() {
     let mut memory = [0; 8];
     let mut transfer = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), Options::default());
     let (outcome, end, sent) = run(&mut transfer, &mut |_: [u8; 8]| vec![]);

@@ -241,7 +241,7 @@ fn a_download_must_match_its_crc_and_its_size() {
 }
 
 #[test]
-fn too_much_is_refused_when_it_comes() {
+fn too_many_bytes_are_refused_when_they_arrive() {
     let mut client = Client::new();
     assert_eq!(client.download(DOMAIN, &data(5001)), Response::Abort(DOMAIN, 0x0800_0020));
     let size = Some(21);

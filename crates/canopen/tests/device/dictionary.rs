@@ -23,7 +23,7 @@ fn every_row_has_its_entry_and_its_place() {
 }
 
 #[test]
-fn what_is_missing_is_told_apart() {
+fn missing_objects_and_sub_indices_have_different_codes() {
     for (row, _) in rows() {
         assert_eq!(DICTIONARY.find(row.index, 0xFF).unwrap_err(), Abort::NoSubIndex);
     }

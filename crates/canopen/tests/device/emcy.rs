@@ -31,7 +31,7 @@ fn the_error_register_follows() {
 }
 
 #[test]
-fn the_list_has_what_was_signalled_newest_first() {
+fn the_list_has_the_signalled_errors_newest_first() {
     let mut bench = Bench::booted();
     assert_eq!(bench.read(0x1003, 0), Ok(vec![0]));
     assert_eq!(bench.read(0x1003, 1), Err(0x0800_0024));
@@ -87,7 +87,7 @@ fn a_fault_that_is_still_there_after_a_reset_is_news_again() {
 }
 
 #[test]
-fn its_identifier_changes_only_while_it_does_not_exist() {
+fn the_identifier_changes_only_while_emcy_is_not_valid() {
     let mut bench = Bench::booted();
     assert_eq!(bench.read(0x1014, 0), Ok(vec![0x85, 0, 0, 0]));
     for refused in [0x86, 0x4000_0085, 0x2000_0085, 0x0000_0885] {

@@ -89,7 +89,7 @@ fn the_event_timer_sends_all_that_waits_or_the_last_one_again() {
 }
 
 #[test]
-fn with_both_times_the_inhibit_time_separates_what_the_timer_sends() {
+fn with_both_times_the_inhibit_time_separates_frames_of_the_timer() {
     let mut bench = operational(255, 1000, 500);
     push(&mut bench, [1, 2, 3]);
     assert_eq!(bench.times_of(TPDO, Duration::from_millis(900)), [500_000, 600_000, 700_000]);

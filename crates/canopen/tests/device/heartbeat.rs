@@ -102,7 +102,7 @@ fn each_node_is_watched_on_its_own() {
 }
 
 #[test]
-fn what_is_no_heartbeat_does_not_count() {
+fn frames_other_than_heartbeats_do_not_count() {
     let mut bench = Bench::booted();
     bench.write32(0x1016, 1, 0x0009_0064).unwrap();
     bench.receive(Frame::new(0x709, &[5, 0]).unwrap());

@@ -28,7 +28,7 @@ fn receive(bench: &mut Bench, data: &[u8]) {
 }
 
 #[test]
-fn nmt_states_are_told_once_each() {
+fn nmt_states_are_reported_once_each() {
     let mut bench = Bench::booted();
     assert_eq!(bench.told(), [Told::State(State::PreOperational)]);
     bench.nmt(START);
@@ -37,7 +37,7 @@ fn nmt_states_are_told_once_each() {
 }
 
 #[test]
-fn an_sdo_write_is_told_when_it_is_stored() {
+fn an_sdo_write_is_reported_after_it_is_stored() {
     let mut bench = Bench::booted();
     bench.told();
     bench.write(0x6100, 0, &[3, 0]).unwrap();
@@ -46,7 +46,7 @@ fn an_sdo_write_is_told_when_it_is_stored() {
 }
 
 #[test]
-fn an_rpdo_is_told_when_its_values_are_there() {
+fn an_rpdo_is_reported_after_its_values_are_stored() {
     let mut bench = mapped(&[0x6200_0010]);
     receive(&mut bench, &[7, 0]);
     assert_eq!((bench.told(), value(&bench, 0x6200)), (vec![Told::Received(1)], vec![7, 0]));
@@ -57,7 +57,7 @@ fn an_rpdo_is_told_when_its_values_are_there() {
 }
 
 #[test]
-fn a_synchronous_rpdo_is_told_before_its_sync() {
+fn a_synchronous_rpdo_is_reported_before_its_sync() {
     let mut bench = mapped(&[0x6200_0010]);
     bench.write32(0x1400, 1, 0x8000_0205).unwrap();
     bench.write(0x1400, 2, &[1]).unwrap();
@@ -70,7 +70,7 @@ fn a_synchronous_rpdo_is_told_before_its_sync() {
 }
 
 #[test]
-fn an_rpdo_leaves_out_what_limits_and_rules_refuse() {
+fn an_rpdo_skips_values_refused_by_limits_and_rules() {
     let mut bench = mapped(&[0x6201_0008, 0x6203_0010]);
     let values = |bench: &Bench| [0x6201, 0x6203].map(|index| value(bench, index));
     receive(&mut bench, &[12, 5, 0]);
@@ -139,7 +139,7 @@ fn a_missing_heartbeat_and_bus_off_are_communication_errors() {
 }
 
 #[test]
-fn the_process_half_leaves_what_waits_to_the_services() {
+fn the_process_half_leaves_waiting_frames_to_the_services() {
     let mut bench = Bench::operational();
     let reset = Frame::new(0, &[0x81, 0]).unwrap();
     let next = bench.device.on_process_frame(&reset, bench.now, &mut bench.out);

@@ -103,7 +103,7 @@ fn a_node_id_can_be_taken_away() {
 }
 
 #[test]
-fn an_unconfigured_device_hears_lss_alone_and_boots_once_it_has_a_node_id() {
+fn an_unconfigured_device_answers_lss_alone_and_boots_with_a_node_id() {
     let mut bench = Bench::unconfigured();
     bench.receive(Frame::new(0, &[1, 0]).unwrap());
     bench.receive(Frame::new(0x600, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap());
@@ -159,7 +159,7 @@ fn nothing_is_sent_from_the_activation_until_two_delays_later() {
 }
 
 #[test]
-fn a_store_is_answered_when_it_is_done() {
+fn a_store_is_answered_after_its_end() {
     for (result, code) in [(Ok(()), 0), (Err(canopen::sdo::Abort::General), 2)] {
         let mut bench = Bench::booted();
         bench.take_action();

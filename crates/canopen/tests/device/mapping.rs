@@ -52,7 +52,7 @@ fn entries_change_only_while_the_count_is_0() {
 }
 
 #[test]
-fn only_what_exists_is_mappable_and_has_this_length_can_be_mapped() {
+fn only_existing_mappable_objects_of_the_right_length_can_be_mapped() {
     let mut bench = disabled();
     assert_eq!(bench.write32(0x1A00, 1, 0x2000_0020), Err(0x0602_0000));
     assert_eq!(bench.write32(0x1A00, 1, 0x6000_0920), Err(0x0602_0000));

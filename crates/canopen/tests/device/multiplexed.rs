@@ -231,7 +231,7 @@ fn a_write_to_another_pdo_sends_nothing() {
 
 /// The parts of a device may change: an object that is sent to all nodes again is sent once, whatever its value.
 #[test]
-fn the_application_leaves_out_what_is_not_there() {
+fn the_application_leaves_out_missing_objects() {
     let mut bench = sender(DESTINATION);
     bench.device.application_mut().not_told = Some(Multiplexer { index: 0x6000, sub: 2 });
     bench.write(0x6201, 0, &[1]).unwrap();

@@ -77,7 +77,7 @@ fn stopped_has_heartbeat_and_nothing_else() {
 }
 
 #[test]
-fn what_waits_for_a_state_with_emcy_is_sent_then() {
+fn an_emcy_waits_for_a_state_with_emcy() {
     let mut bench = Bench::booted();
     bench.nmt(STOP);
     bench.raise(SENSOR_BREAK);
@@ -88,7 +88,7 @@ fn what_waits_for_a_state_with_emcy_is_sent_then() {
 }
 
 #[test]
-fn a_reset_is_told_once_and_the_node_waits_for_its_start() {
+fn a_reset_is_reported_once_and_the_node_waits_for_its_start() {
     for (command, action) in
         [(RESET_NODE, Action::ResetNode), (RESET_COMMUNICATION, Action::ResetCommunication)]
     {

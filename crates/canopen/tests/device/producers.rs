@@ -1,4 +1,4 @@
-//! What a device does of its own accord: SYNCs and time stamps, NMT commands of the application, its node-ID.
+//! Services that a device starts: SYNCs and time stamps, NMT commands of the application, its node-ID.
 
 use canopen::dictionary::{Access, Dictionary, Mapping, Object, Services, Type};
 use canopen::nmt::{Command, State};
@@ -210,7 +210,7 @@ impl Application for Echo {
 }
 
 #[test]
-fn publish_sends_what_a_hook_has_changed() {
+fn publish_sends_changes_of_a_hook() {
     let mut node: canopen::device!(Echo, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Echo);
     let mut sent = Sent::default();
     let _ = node.start(Instant(0), &mut sent);

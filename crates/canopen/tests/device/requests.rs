@@ -1,4 +1,4 @@
-//! What an application can choose for requests of SDO clients: a value at the moment of its upload, and short requests.
+//! Choices of an application for requests of SDO clients: a value at the moment of its upload, and short requests.
 
 use canopen::dictionary::{Access, Dictionary, Entry, Field, Object, Type};
 use canopen::sdo::{Abort, Multiplexer};

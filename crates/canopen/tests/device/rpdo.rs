@@ -57,7 +57,7 @@ fn a_synchronous_type_takes_the_newest_data_with_the_sync() {
 }
 
 #[test]
-fn outside_operational_data_is_ignored_and_what_waits_is_dropped() {
+fn outside_operational_data_is_ignored_and_waiting_data_is_dropped() {
     let mut bench = bench();
     send(&mut bench, RPDO2, &[3, 4]);
     bench.nmt(0x80);
@@ -141,7 +141,7 @@ fn dummy_entries_skip_bytes() {
 }
 
 #[test]
-fn what_cannot_be_received_cannot_be_mapped() {
+fn objects_that_cannot_be_received_cannot_be_mapped() {
     let mut bench = Bench::booted();
     assert_eq!(bench.write32(0x1600, 1, 0x6000_0120), Err(0x0604_0041));
     assert_eq!(bench.write32(0x1600, 1, 0x6100_0010), Err(0x0604_0041));

@@ -156,14 +156,14 @@ fn a_reset_is_left_to_the_caller() {
 }
 
 #[test]
-fn what_it_does_not_store_is_not_called_stored() {
+fn an_unsupported_store_is_not_reported_as_stored() {
     let mut bench = Bench::booted();
     assert_eq!(bench.write(0x1010, 1, b"save"), Err(Abort::NotStored.code()));
     assert_eq!(bench.read(0x1010, 1), Ok(vec![1, 0, 0, 0]));
 }
 
 #[test]
-fn lss_tells_its_identity() {
+fn lss_reports_the_identity() {
     let mut bench = Bench::booted();
     bench.receive(Frame::new(0x7E5, &[4, 1, 0, 0, 0, 0, 0, 0]).unwrap());
     let answers = bench.receive(Frame::new(0x7E5, &[0x5A, 0, 0, 0, 0, 0, 0, 0]).unwrap());

@@ -45,7 +45,7 @@ fn a_multiplexed_pdo_is_none() {
 }
 
 #[test]
-fn what_is_answered_or_told_once_is_none() {
+fn responses_and_single_reports_are_no_states() {
     let mut bench = Bench::booted();
     bench.raise(SENSOR_BREAK);
     bench.read(0x1008, 0).unwrap();

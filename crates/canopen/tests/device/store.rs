@@ -53,7 +53,7 @@ fn reset(bench: &mut Bench, command: u8) {
 }
 
 #[test]
-fn the_sub_index_says_what_is_stored_and_restored() {
+fn the_sub_index_selects_the_stored_and_restored_group() {
     let selections = [
         (1, Groups::ALL_PARAMETERS),
         (2, Groups::one(Group::Communication)),
@@ -106,7 +106,7 @@ fn a_wrong_signature_stores_nothing() {
 }
 
 #[test]
-fn a_memory_that_fails_is_told_to_the_client() {
+fn a_failing_memory_is_reported_to_the_client() {
     let mut bench = Bench::booted();
     begin(&mut bench, 0x1010, 1, SAVE);
     assert_eq!(finish(&mut bench, Err(Abort::Hardware)), [0x80, 0x10, 0x10, 1, 0, 0, 6, 6]);
@@ -119,7 +119,7 @@ fn a_repeated_request_waits_for_the_same_job_and_another_one_is_refused() {
     assert_eq!(bench.ask_raw([0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e']), None);
     assert_eq!(bench.take_action(), None);
     assert_eq!(bench.write(0x1010, 3, &SAVE), Err(0x0800_0022));
-    // The client has continued with another transfer, so nobody waits for the first job.
+    // The client has continued with another transfer, so no client waits for the first job.
     bench.take();
     bench.finish(Ok(()));
     assert_eq!(bench.sent(), []);

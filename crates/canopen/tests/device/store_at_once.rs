@@ -69,7 +69,7 @@ fn finish(bench: &mut Bench, result: Result<(), Abort>) -> Vec<Vec<u8>> {
 
 /// The values of the first run were copied before the second request.
 #[test]
-fn a_request_that_repeats_a_handed_over_job_runs_it_again_and_waits_for_the_second_run() {
+fn a_repeated_request_runs_a_handed_over_job_again_and_waits_for_the_second_run() {
     for first in [SAVE, preset(1)] {
         for second in [SAVE, preset(2)] {
             let mut bench = booted();

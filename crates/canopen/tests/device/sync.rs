@@ -73,7 +73,7 @@ fn the_start_value_is_fixed_while_the_pdo_is_valid() {
 }
 
 #[test]
-fn a_missing_sync_is_signalled_until_it_is_back() {
+fn a_missing_sync_is_signalled_until_it_returns() {
     let mut bench = bench(1, 0, false);
     bench.write32(0x1006, 0, 10_000).unwrap();
     bench.run(Duration::from_millis(100));

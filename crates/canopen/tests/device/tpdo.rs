@@ -132,7 +132,7 @@ fn synchronous_types_ignore_event_timer_and_remote_frames() {
 }
 
 #[test]
-fn type_252_sends_on_request_what_the_sync_sampled() {
+fn type_252_sends_the_sample_of_the_sync_on_request() {
     let mut bench = bench(252, 0, 0);
     request(&mut bench);
     assert!(sent(&mut bench).is_empty());
@@ -155,7 +155,7 @@ fn type_253_samples_and_sends_on_request() {
 }
 
 #[test]
-fn event_types_answer_a_remote_frame_unless_it_is_forbidden() {
+fn event_types_answer_a_remote_frame_unless_forbidden() {
     let mut bench = bench(255, 0, 0);
     bench.take();
     request(&mut bench);

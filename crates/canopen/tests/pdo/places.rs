@@ -116,7 +116,7 @@ fn every_number_is_a_pdo_of_its_own() {
 }
 
 #[test]
-fn the_multiplexed_one_has_what_is_mapped_nowhere() {
+fn the_multiplexed_pdo_has_all_unmapped_objects() {
     let mut bench = Bench::operational();
     assert_eq!((bench.change(0x2006), bench.change(0x2003)), (vec![0x505], vec![]));
     bench.write_cob_id(0x1904, 0xC000_0180).unwrap();

@@ -1,4 +1,4 @@
-//! Tests that the plots and tables in docs/ agree with the chain as it is now, and with theory.
+//! Tests that the plots and tables in docs/ agree with the present chain, and with theory.
 
 use profiles::encoder::SENSOR_POSITION_ERROR;
 

@@ -67,7 +67,7 @@ mod tests {
     const AREA: Area = Area { low: 100, high: 200 };
 
     #[test]
-    fn a_limit_of_the_sensor_is_reported_when_it_is_reached_and_one_of_the_area_beyond_it() {
+    fn a_limit_of_the_sensor_is_reported_at_the_limit_and_one_of_the_area_beyond() {
         let module = Module { offset: 0, low: -50, high: 50 };
         for (position, native, state) in [
             (99, 0, UNDERFLOW),

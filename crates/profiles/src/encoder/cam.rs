@@ -2,8 +2,8 @@
 
 /// One cam of one channel.
 ///
-/// A cam goes on from the low to the high limit, both included. A limit below zero is a position at the end of the
-/// range, so a window can go across zero. It stays on until the position is further outside than
+/// A cam becomes active from the low to the high limit, both included. A limit below zero is a position at the end of the
+/// range, so a window can go across zero. The cam stays active until the position is further outside than
 /// the hysteresis. Limits in the wrong order are swapped (CiA 406 is silent about them).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cam {
@@ -73,7 +73,7 @@ pub struct CamChannel {
     inverted: [u8; 2],
     /// Bits of the cams that begin within the range.
     reachable: u8,
-    /// For each cam: the window in which the cam goes on, and the window in which the cam stays on.
+    /// For each cam: the window in which the cam becomes active, and the window in which it stays active.
     windows: [[Window; 2]; 8],
     active: u8,
 }
@@ -144,7 +144,7 @@ mod tests {
 
     const WHOLE: i64 = 1 << 32;
 
-    /// The same rule, step by step: a cam goes on inside its window and goes off beyond the margin.
+    /// The same rule, step by step: a cam becomes active inside its window and inactive beyond the margin.
     fn walk(cam: Cam, positions: &[u32], range: i64) -> Vec<bool> {
         let (low, high) = (i64::from(cam.low.min(cam.high)), i64::from(cam.low.max(cam.high)));
         let margin = i64::from(cam.hysteresis);

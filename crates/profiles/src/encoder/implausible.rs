@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_only_too_fast_does_not_come_back_by_itself() {
+    fn a_too_fast_movement_is_not_trusted_again_without_a_request() {
         let mut implausible = ImplausibleReadings::new(25, 0, 900, 1001, FASTEST);
         assert!((2..100).all(|n| !implausible.is_back(1001 * n, FASTEST)));
     }

@@ -480,7 +480,7 @@ impl Input {
     }
 }
 
-/// What determines the position of a sensor, and the properties of its index.
+/// The source of the position of a sensor, and the properties of its index.
 #[inline(never)]
 fn marks(sensor: &Sensor, scale: &Scale, users: u8) -> (Basis, Marks) {
     let basis = Basis::of(sensor, scale);

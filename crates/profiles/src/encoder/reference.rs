@@ -30,7 +30,7 @@ enum Index {
     Right,
     /// The index did not come.
     Missing,
-    /// The index came so many steps from its place.
+    /// The distance of the index from its place, in steps.
     Elsewhere(i64),
 }
 
@@ -121,7 +121,7 @@ impl Reference {
         }
     }
 
-    /// An index may have gone unseen: the distance to the next one starts anew.
+    /// An index may have gone unseen: the distance to the next one restarts.
     pub(super) fn forgive(&mut self) {
         self.since = 0;
     }

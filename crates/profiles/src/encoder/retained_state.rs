@@ -259,7 +259,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn words_give_back_what_was_kept(channels in prop::array::uniform2(any_channel()), tenths: u32, millis: u32) {
+        fn retained_words_read_back(channels in prop::array::uniform2(any_channel()), tenths: u32, millis: u32) {
             let retained = RetainedState { channels, operating_time: OperatingTime { tenths, millis } };
             prop_assert_eq!(RetainedState::from_words(&retained.to_words()), retained);
         }

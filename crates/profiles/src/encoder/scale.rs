@@ -152,14 +152,14 @@ impl Scale {
         self.reversed
     }
 
-    /// Whether the position is the same after so many native steps, 2^32 at most.
+    /// Whether the position is the same after this number of native steps, 2^32 at most.
     pub(super) fn repeats_after(&self, steps: u64) -> bool {
         // A turn and a range have at most 2^32 steps each, so their product fits 64 bits.
         let range = NonZeroU64::from(self.turn).saturating_mul(self.range);
         steps.saturating_mul(self.units.into()) % range == 0
     }
 
-    /// Whether the range is that of a code of so many native steps, to one unit.
+    /// Whether the range is that of a code of this number of native steps, to one unit.
     pub(super) fn covers(&self, steps: u64) -> bool {
         steps.saturating_mul(self.units.into()) / NonZeroU64::from(self.turn) == self.range.get()
     }
@@ -213,7 +213,7 @@ impl Scale {
         low_word(if a >= b { a - b } else { a + self.range.get() - b })
     }
 
-    /// The position so many units further.
+    /// The position this number of units further.
     #[must_use]
     #[inline(never)]
     pub(super) fn moved(&self, position: u32, units: i32) -> u32 {

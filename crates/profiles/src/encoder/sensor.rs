@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_position_goes_on_between_sensors_whose_readings_mean_the_same() {
+    fn a_position_continues_between_sensors_with_equal_readings() {
         let encoder = Sensor {
             kind: SensorType::Incremental,
             resolution: NonZeroU32::new(4000).unwrap(),
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn every_type_resolves_what_it_says() {
+    fn every_type_has_its_resolution() {
         let expected = [
             (SensorType::SingleTurn, 8192, 1, 13),
             (SensorType::MultiTurn, 8192, 4096, 25),

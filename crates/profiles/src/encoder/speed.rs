@@ -202,7 +202,7 @@ mod tests {
 
     /// Two steps a second, then a hundred: the long pauses before do not affect the present speed.
     #[test]
-    fn a_slow_shaft_that_speeds_up_forgets_how_slow_it_was() {
+    fn the_average_of_a_slow_shaft_restarts_when_it_speeds_up() {
         let mut speedometer = Speedometer::new(0);
         (1..=3000_u32).for_each(|t| _ = speedometer.update(t / 500));
         let speeds: Vec<f32> = (1..=300_u32).map(|t| speedometer.update(6 + t / 10)).collect();

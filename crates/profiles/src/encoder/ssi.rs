@@ -194,7 +194,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn decodes_what_an_encoder_sends(format in any_format(), raw: u32, alarm: bool, tail in 1..=28_u32) {
+        fn words_of_an_encoder_decode(format in any_format(), raw: u32, alarm: bool, tail in 1..=28_u32) {
             let position = raw & u32::MAX >> (32 - format.position_bits());
             let reading = format.read(frame(format, position, alarm, tail)).unwrap();
             prop_assert_eq!((reading.position, reading.alarm), (position, alarm && format.alarm));

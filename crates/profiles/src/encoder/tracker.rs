@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tracker_tells_the_step_in_turns_of_any_length() {
+    fn a_tracker_measures_the_step_in_turns_of_any_length() {
         let mut tracker = Tracker::new(TEN, 16, 1000, 25);
         assert_eq!((tracker.step_in(TEN), tracker.step_in(NonZeroU32::new(7).unwrap())), (5, 4));
         tracker.follow(1002);

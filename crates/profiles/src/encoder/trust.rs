@@ -1,10 +1,10 @@
-//! The trust in a position: what is known of it after a start, a loss of readings and a preset.
+//! The trust in a position: its state after a start, a loss of readings and a preset.
 //!
 //! A sensor with its code or its index determines a part of the position; the rest is counted, and counting needs an
 //! unbroken run. What breaks it, and what follows:
 //!
 //! * The last sample before a reset or a loss of power saw a shaft that turned, or the shaft turns when the node is
-//!   back: nobody knows how far it has turned in between.
+//!   back: the movement in between is unknown.
 //! * The memory has not survived a loss of power.
 //! * No reading came for so long that the code can have made half a round more or less than expected.
 //!
@@ -16,7 +16,7 @@ use super::{Scale, Sensor, SensorType};
 /// All users of a sensor.
 pub(super) const ALL: u8 = 0x0F;
 
-/// What determines the position.
+/// The source of the position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Basis {
     /// The reading alone: the code has a whole number of ranges.
@@ -105,7 +105,7 @@ impl Trust {
         self.users |= ALL << 4;
     }
 
-    /// After a movement that nobody has seen. The place of the index in the count is lost too.
+    /// After an unseen movement. The place of the index in the count is lost too.
     pub(super) fn unseen(self) -> Trust {
         Trust { users: u8::MAX, flags: self.flags & !Trust::REFERENCED }
     }
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shaft_is_at_rest_after_a_tenth_of_a_second_and_while_it_dithers() {
+    fn a_shaft_is_at_rest_after_a_tenth_of_a_second_and_during_dither() {
         assert!(!Rest::new(false).is_moving());
         let mut rest = Rest::new(true);
         (0..99).for_each(|n| assert!(!rest.follow(n % 2) && rest.is_moving()));
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_movement_that_nobody_saw_counts_where_the_reading_is_not_enough() {
+    fn an_unseen_movement_counts_where_the_reading_does_not_suffice() {
         let turning = Trust { users: 0, flags: Trust::MOVING };
         for (basis, is_lost) in
             [(Basis::Code, false), (Basis::LongCode, false), (Basis::ShortCode, true), (Basis::Count, true)]

@@ -120,7 +120,7 @@ impl Pdo {
 pub struct Definition {
     /// The PDO.
     pub pdo: &'static Pdo,
-    /// Node-ID of the producer, if the identifier tells it.
+    /// Node-ID of the producer, if the identifier contains it.
     pub producer: Option<u8>,
 }
 

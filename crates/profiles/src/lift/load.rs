@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn two_points_make_a_line_that_goes_on() {
+    fn two_points_make_a_line_beyond_both() {
         let mut unit = LoadUnit::new(ChipThermometer::UNKNOWN, &hydraulic());
         for (pascal, load) in [(2.0e5, 0), (3.0e5, 200), (6.0e5, 800), (8.0e5, 1200), (1.0e5, 0)] {
             let snapshot = unit.sample(&raw(pascal));

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_is_told_in_its_order() {
+    fn every_change_is_reported_in_its_order() {
         let mut calls = Calls::default();
         for pressed in [[true, false], [true, true], [true, true], [false, true], [false, false]] {
             calls.observe(pressed);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_finds_no_room_is_covered_by_the_states() {
+    fn discarded_changes_are_covered_by_the_states() {
         let mut calls = Calls::default();
         for change in 0..WAITING + 3 {
             calls.observe([change % 2 == 0, false]);

@@ -238,7 +238,7 @@ struct Unit {
     limits: Area,
     /// The bit of the unit among the users of its sensor.
     user: u8,
-    /// Whether nobody has said where the unit is.
+    /// Whether the position of the unit was never set.
     needs_preset: bool,
     /// An index says where the unit is.
     has_mark: bool,

@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_says_whether_it_is_set() {
+    fn an_input_word_has_its_state() {
         assert_eq!(Word([1, 2, 3, 4, 5, 0x33]).with_state(false), Word([1, 2, 3, 4, 5, 0x30]));
         assert_eq!(Word([1, 2, 3, 4, 5, 0x30]).with_state(true), Word([1, 2, 3, 4, 5, 0x31]));
     }

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_temperature_it_is_the_reference() {
+    fn without_a_temperature_the_reference_is_used() {
         assert_eq!(DRIFTING.pressure(0.3, None).to_bits(), DRIFTING.pressure(0.3, Some(298.15)).to_bits());
     }
 
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_gives_no_single_rising_pressure_is_not_valid() {
+    fn a_characteristic_without_a_rising_pressure_is_invalid() {
         let good = PressureCalibration::default();
         assert!(good.is_valid() && DRIFTING.is_valid());
         let no_span = PressureCalibration { span: Polynomial::constant(0.0), ..good };

@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_measurement_is_invalid_and_a_number_all_the_same() {
+    fn an_impossible_measurement_is_invalid_and_finite() {
         for (value, is_from_an_intact_sensor, number) in [
             (5.0, false, 5.0),
             (f32::NAN, true, 0.0),
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn new_parameters_hold_from_the_next_sample_and_the_filter_goes_on() {
+    fn new_parameters_act_from_the_next_sample_and_the_filter_continues() {
         let average = |constant| ChannelParameters { filter_type: 1, filter_constant: constant, ..plain() };
         let mut channel = Channel::new(&average(4));
         channel.sample(0.0, true);

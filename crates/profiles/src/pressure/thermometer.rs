@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_gives_no_single_rising_temperature_is_not_valid() {
+    fn a_characteristic_without_a_rising_temperature_is_invalid() {
         let good = TemperatureCalibration::default();
         assert!(good.is_valid());
         for factor in [0.0, -1.0, f32::INFINITY, f32::NAN] {

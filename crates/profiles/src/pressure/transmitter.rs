@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_temperature_that_comes_back_holds_its_fault_too() {
+    fn a_recovered_temperature_keeps_its_fault_until_the_filter_is_full() {
         let none = RawSample { temperature: 0, ..GOOD };
         let half_over = RawSample { temperature: 16 * 470, ..GOOD };
         let mut transmitter = Transmitter::new(CHIP, &Parameters::default());

@@ -79,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_what_their_codes_say() {
+    fn the_defaults_have_the_units_of_their_codes() {
         assert_eq!(Unit::pressure(0x004E_0000), Some(Unit::BAR));
         assert_eq!(Unit::temperature(0x002D_0000), Some(Unit::CELSIUS));
     }
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn every_unit_is_what_its_definition_says() {
+    fn every_unit_follows_its_definition() {
         for (code, pascal) in [
             (0x0022_0000, 1.0),
             (0x004E_0000, 100_000.0),

@@ -55,7 +55,7 @@ impl Node {
 }
 
 #[test]
-fn the_list_selects_it_by_its_number() {
+fn the_list_selects_the_profile_by_its_number() {
     assert_eq!(Personality::numbered(1), Some(Personality::Switches));
     assert_eq!(Personality::default(), Personality::Encoder);
     let rows = Personality::Switches.rows();
@@ -69,7 +69,7 @@ fn the_list_selects_it_by_its_number() {
 }
 
 #[test]
-fn it_measures_and_shows_what_it_measures() {
+fn the_profile_measures_and_shows_its_values() {
     let mut node = Node::new();
     for digital in [[false; 2], [true, false], [true, true], [false, true], [true, true]] {
         node.sample(digital);
@@ -93,7 +93,7 @@ fn it_decides_on_its_own_objects_and_lights_its_lamps() {
 }
 
 #[test]
-fn it_is_told_of_a_sync_and_of_an_error() {
+fn the_profile_receives_syncs_and_errors() {
     let mut node = Node::new();
     node.sample([true, true]);
     assert_eq!(node.read(0x2403, 0), 0);

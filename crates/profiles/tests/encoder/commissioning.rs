@@ -15,7 +15,7 @@ fn progress(bench: &mut Bench) -> Progress {
 }
 
 #[test]
-fn off_until_it_is_asked_for() {
+fn the_diagnostic_is_off_until_requested() {
     let mut bench = Bench::new(one(SensorType::MultiTurn));
     assert_eq!(progress(&mut bench), Progress::Off);
     bench.change(|parameters| parameters.operating = COMMISSIONING);

@@ -70,7 +70,7 @@ fn the_limits_of_the_module_are_in_steps_of_the_sensor() {
 }
 
 #[test]
-fn beyond_its_word_a_counted_position_goes_on_and_an_absolute_one_is_what_the_sensor_says() {
+fn beyond_its_word_a_counted_position_continues_and_an_absolute_one_follows_the_sensor() {
     let around_zero = |kind| {
         let module = Module { offset: 0, low: -100, high: 100 };
         Bench::new(Parameters { module, index: false, ..one(kind) })

@@ -170,7 +170,7 @@ fn an_index_that_is_lost_is_noticed_every_time() {
 
 /// 4096 steps a revolution at 6000 rpm: 409,600 steps a second, which INTEGER16 cannot hold.
 #[test]
-fn a_long_speed_value_has_its_unit_and_its_average_and_the_short_one_says_that_it_is_at_its_limit() {
+fn a_long_speed_value_has_unit_and_average_and_the_short_one_a_limit_bit() {
     for (is_in_own_unit, millis, fastest, after) in
         [(false, 1, 409_600, 409_600), (true, 1, 600_000, 600_000), (true, 100, 600_000, 379_000)]
     {

@@ -21,7 +21,7 @@ fn the_encoder_type_is_that_of_the_sensor_or_of_two() {
 }
 
 #[test]
-fn every_sensor_must_be_able_to_give_what_is_asked_for() {
+fn parameters_beyond_a_sensor_are_refused() {
     // 4096 steps a revolution and 4096 revolutions; 8192 steps, once; steps of 4096 nm.
     let (fine, coarse) = (one(SHAFT), two(SHAFT, SensorType::SingleTurn));
     let rod = Parameters { step: 10_000, ..two(SHAFT, ROD) };

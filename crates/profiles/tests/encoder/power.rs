@@ -40,7 +40,7 @@ fn counted_positions_go_on_where_they_were() {
 }
 
 #[test]
-fn what_is_not_counted_electronically_starts_afresh() {
+fn a_count_without_electronic_multi_turn_restarts() {
     for (kind, position) in [(SensorType::Incremental, 0), (SensorType::SingleTurn, 100_000 % 8192)] {
         let mut bench = Bench::new(one(kind));
         (0..=20).for_each(|turns| _ = bench.go(turns * 5000));
@@ -53,7 +53,7 @@ fn what_is_not_counted_electronically_starts_afresh() {
 
 /// Turned during a loss of power, by less than half of the sensor's range.
 #[test]
-fn an_absolute_sensor_knows_what_happened_in_the_dark() {
+fn an_absolute_sensor_follows_movements_without_power() {
     let mut bench = Bench::new(one(SensorType::SingleTurnCounted));
     (0..=20).for_each(|turns| _ = bench.go(turns * 3000));
     bench.rest();
@@ -63,7 +63,7 @@ fn an_absolute_sensor_knows_what_happened_in_the_dark() {
 }
 
 #[test]
-fn an_incremental_sensor_notices_at_the_index_that_it_was_turned_in_the_dark() {
+fn an_incremental_sensor_detects_a_movement_without_power_at_the_index() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     bench.go(5000);
@@ -108,7 +108,7 @@ fn the_offset_is_stored_with_the_parameters() {
 /// An absolute position is unchanged. A position that needs retained memory is never shown as known before it is
 /// referenced.
 #[test]
-fn without_a_battery_a_position_is_right_or_says_that_it_is_lost() {
+fn without_a_battery_a_position_is_right_or_reported_as_lost() {
     let lost = SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR;
     for (kind, state) in [
         (SensorType::MultiTurn, 0),
@@ -183,7 +183,7 @@ fn another_sensor_takes_back_nothing() {
 }
 
 #[test]
-fn what_was_kept_is_still_there_before_the_first_sample() {
+fn retained_data_is_unchanged_before_the_first_sample() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     bench.go(5000);
@@ -205,7 +205,7 @@ fn damage_is_a_memory_error_and_an_alarm_where_a_position_is_lost() {
 }
 
 #[test]
-fn operating_time_goes_on() {
+fn operating_time_continues() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     (0..360_000).for_each(|_| _ = bench.stay());
     assert_eq!(bench.stay().operating_time, 1);
@@ -214,7 +214,7 @@ fn operating_time_goes_on() {
     assert_eq!(back.stay().operating_time, 2, "the millisecond counts too");
 }
 
-/// The last sample saw the shaft turn, so nobody knows how far it has turned since.
+/// The last sample saw the shaft turn, so the movement since then is unknown.
 #[test]
 fn a_shaft_that_turns_at_a_reset_has_lost_its_turns() {
     for (kind, is_known) in [
@@ -251,7 +251,7 @@ fn a_shaft_that_turns_right_after_a_start_has_turned_before() {
     }
 }
 
-/// What a firmware before this layout has retained says nothing about the position.
+/// Data retained by a firmware before this layout has no position.
 #[test]
 fn words_of_an_older_layout_are_a_lost_position() {
     let mut words = RetainedState::default().to_words();

@@ -65,7 +65,7 @@ fn the_encoder_s_own_alarm_is_one() {
 
 /// After an outage the sensor may be as far away as it can have moved, but not a step further.
 #[test]
-fn a_sensor_comes_back_from_where_it_can_have_moved() {
+fn readings_within_the_possible_movement_are_accepted_again() {
     for (moved, is_believed) in [(510_000, true), (510_001, false)] {
         let mut bench = Bench::new(one(SensorType::MultiTurn));
         bench.stay();
@@ -79,7 +79,7 @@ fn a_sensor_comes_back_from_where_it_can_have_moved() {
 
 /// Implausible readings are rejected however long they last; a preset accepts them.
 #[test]
-fn a_jump_is_not_taken_over_until_it_is_back_or_the_position_is_preset() {
+fn a_jump_is_rejected_until_the_code_returns_or_a_preset() {
     for step in [0, 3, -700] {
         let mut bench = Bench::new(delivered(SensorType::MultiTurn));
         let mut total = 100_000;
@@ -251,7 +251,7 @@ fn a_sensor_that_is_well_again_is_believed_on_request() {
     let start = Start::Retained(jumped().encoder.retained_state());
     let snapshot = Bench::started(delivered(SensorType::MultiTurn), start, 700_000).stay();
     assert_eq!((snapshot.channels[0].position, snapshot.alarms), (700_000, 0));
-    // Turns that nobody has counted are no matter of belief.
+    // Uncounted turns are lost, also with a trusted reading.
     let mut bench = Bench::new(delivered(SensorType::SingleTurnCounted));
     (0..50).for_each(|_| _ = bench.stay());
     (0..200).for_each(|_| _ = bench.go(4096));

@@ -1,4 +1,4 @@
-//! What the judge has counted.
+//! The counts of the judge.
 
 use std::collections::BTreeMap;
 

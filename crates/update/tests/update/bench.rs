@@ -28,7 +28,7 @@ pub(crate) fn keys() -> salty::Keypair {
     key_number(0)
 }
 
-/// A key: 0 the release key, 1 the root key, 2 the recovery key of the test node; the others belong to nobody yet.
+/// A key: 0 the release key, 1 the root key, 2 the recovery key of the test node; the others are unused.
 pub(crate) fn key_number(number: u8) -> salty::Keypair {
     salty::Keypair::from(&[7 + number; 32])
 }

@@ -116,7 +116,7 @@ fn headers() -> Vec<Kind> {
     ]
 }
 
-/// The image with the certificates of these generations, which nobody has signed, and good sums.
+/// The image with unsigned certificates of these generations, and good sums.
 fn certified(release: u32, root: u32, change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
     header(|bytes| {
         put(36, release)(bytes);
@@ -226,7 +226,7 @@ fn a_client_that_does_not_say_the_size_is_refused_the_same() {
 }
 
 #[test]
-fn what_was_changed_for_the_table_is_good_without_the_change() {
+fn every_bad_image_of_the_table_is_good_without_its_change() {
     for image in [bytes(|_| ()), header(|_| ()), signed(|_| ())] {
         assert_eq!(image, image_b().bytes());
     }

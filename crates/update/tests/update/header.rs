@@ -51,7 +51,7 @@ fn check<T: std::fmt::Debug>(strategy: impl Strategy<Value = T>, test: impl Fn(T
 }
 
 #[test]
-fn what_is_encoded_is_parsed() {
+fn an_encoded_header_is_parsed() {
     check(header(), |header| assert_eq!(Header::parse(&header.encode()), Ok(header)));
 }
 
@@ -65,7 +65,7 @@ fn a_change_of_any_byte_is_refused() {
 }
 
 #[test]
-fn a_wrong_crc_is_told_from_a_wrong_content() {
+fn a_wrong_crc_and_a_wrong_content_have_different_codes() {
     check((header(), 8..HEADER_LEN, 1..=u8::MAX), |(header, at, change)| {
         let mut bytes = header.encode();
         bytes[at] ^= change;
@@ -75,7 +75,7 @@ fn a_wrong_crc_is_told_from_a_wrong_content() {
 
 /// Any accepted bytes, with a valid CRC over random content, equal the encoding of the parsed value.
 #[test]
-fn what_is_parsed_encodes_to_the_same_bytes() {
+fn a_parsed_header_encodes_to_the_same_bytes() {
     let words = prop::collection::vec((0..HEADER_LEN / 4 - 1, any::<[u8; 4]>()), 0..3);
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
     check((header(), words), |(header, words)| {

@@ -96,7 +96,7 @@ fn a_stolen_root_key_is_revoked_by_a_list_of_the_recovery_key_whatever_the_thief
     is_revoked(&flash, &next, 17);
 }
 
-/// Nobody replaces a key of its own rank or above.
+/// No key replaces a key of its own rank or above.
 #[test]
 fn a_key_signs_for_the_rank_below_it_only() {
     let flash = flash_with(&image(1, 5, KeyList::default(), RELEASE), 1);
@@ -118,7 +118,7 @@ fn a_key_signs_for_the_rank_below_it_only() {
     for by in [RELEASE, ROOT, RECOVERY, NEXT_ROOT] {
         assert_eq!(refusal(&flash, &image(2, 5, keys, by)), signature, "{by}");
     }
-    // A certificate of the release key is none of a root key, and the other way round.
+    // A certificate of the release key is not valid for a root key, and the other way round.
     let of_release = certificate(16, 0, NEXT_ROOT, ROOT);
     let keys = KeyList { release: Some(certificate(17, 0, THIEF, NEXT_ROOT)), root: Some(of_release) };
     assert_eq!(refusal(&flash, &image(2, 5, keys, THIEF)), signature);
@@ -134,7 +134,7 @@ fn every_changed_bit_of_a_certificate_is_refused() {
         let mut bytes = keys.encode();
         bytes[bit / 8] ^= 1 << (bit % 8);
         let about = Description { keys: KeyList::from_bytes(&bytes), ..description(2, 5) };
-        // A header whose generations do not fit is none.
+        // A header whose generations do not fit is not valid.
         let Some(header) = update::Header::describe(about, &good.code) else { continue };
         let changed = Image { header, code: good.code.clone() }.signed_by(&key_number(NEXT_RELEASE));
         let found = application(&mut put(&flash, &changed), &target(), Proof::None);

@@ -54,7 +54,7 @@ fn images_of_every_length_around_chunks_and_sectors_and_the_longest() {
 }
 
 #[test]
-fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
+fn the_updater_reports_its_state_and_the_bootloader_stays_responsive() {
     let mut flash = flash_with(&image_a(), 1);
     let mut updater = Updater::new(&mut flash, target(), Status::refused(Refusal::NoProgram));
     assert_eq!((updater.phase(), updater.status().code), (Phase::Idle, 1));
@@ -163,7 +163,7 @@ fn a_committed_image_that_is_no_longer_good_is_given_up() {
 }
 
 #[test]
-fn a_damaged_application_comes_back_from_staging() {
+fn a_damaged_application_is_restored_from_staging() {
     for at in [APPLICATION + 3, APPLICATION + HEADER + 100] {
         let mut flash = flash_with(&image_a(), 1);
         flash.disturb(at, |byte| byte ^ 8);
@@ -186,7 +186,7 @@ fn a_damaged_application_without_another_copy_does_not_start() {
 }
 
 #[test]
-fn a_program_for_other_hardware_does_not_start_even_when_it_is_there() {
+fn an_installed_program_for_other_hardware_does_not_start() {
     let mut flash = flash_with(&image_a(), 1);
     let mut other = target();
     other.hardware = 5;
@@ -223,7 +223,7 @@ fn the_security_counter_outlives_the_application() {
     assert_starts(&mut flash, &with(3, 5));
 }
 
-/// The counter is recorded before the bootloader takes the next download, also if the application was told to enter the
+/// The counter is recorded before the bootloader takes the next download, also if a master has sent the application into the
 /// bootloader.
 #[test]
 fn the_counter_is_kept_before_the_application_can_be_replaced() {
@@ -239,7 +239,7 @@ fn the_counter_is_kept_before_the_application_can_be_replaced() {
 
 /// The counter is recorded for a signed application only: otherwise a forged header would lock the node for good.
 #[test]
-fn the_counter_of_an_application_that_nobody_has_signed_is_not_kept() {
+fn the_counter_of_an_unsigned_application_is_not_recorded() {
     let mut flash = flash_with(&image_a(), 1);
     clear(&mut flash);
     let forged = Header::describe(description(1, 20), &image_b().code).unwrap();
@@ -370,7 +370,7 @@ fn downloads_one_after_the_other_need_no_restart() {
 /// Code and header are complete and all sums are right, but the image is not signed. Such an application is refused
 /// however it got there.
 #[test]
-fn an_application_that_nobody_has_signed_is_not_started() {
+fn an_installed_unsigned_application_is_not_started() {
     let mut flash = flash_with(&image_a(), 1);
     let forged = Image { header: Header::describe(description(1, 5), &image_b().code).unwrap(), ..image_b() };
     put(&mut flash, &forged);

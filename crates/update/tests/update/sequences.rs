@@ -70,7 +70,7 @@ struct Pending {
     cuts: u32,
 }
 
-/// What the node holds: the program that was confirmed last, and the one on trial.
+/// The programs of the node: the one that was confirmed last, and the one on trial.
 #[derive(Clone, Debug)]
 struct Model {
     confirmed: usize,
@@ -385,7 +385,7 @@ fn after_every_step_of_a_random_sequence_an_allowed_program_runs() {
 }
 
 /// The trial of B is as before after an update to C that was broken off: at each place, B runs, can be confirmed, and
-/// goes after three starts that nobody has requested.
+/// goes after three unrequested starts.
 #[test]
 fn an_update_that_is_broken_off_during_a_trial_does_not_end_it() {
     let [a, b, c, ..] = &programs()[..] else { panic!() };

@@ -8,8 +8,8 @@ use crate::bench::{
 use update::key::KeyList;
 use update::mock::{MockFlash, Weak};
 use update::{
-    Clears, Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial,
-    Updater, boot,
+    Clears, Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay,
+    Trial, Updater, boot,
 };
 
 fn trial(flash: &mut MockFlash) -> Trial {
@@ -28,7 +28,7 @@ fn b_on_trial(seed: u64) -> MockFlash {
 }
 
 #[test]
-fn the_first_image_is_on_no_trial_and_each_one_after_it_is() {
+fn the_first_image_has_no_trial_and_every_later_one_has() {
     let mut flash = flash_with(&image_a(), 1);
     assert_eq!(trial(&mut flash), Trial::None, "there is no way back");
     for image in [image_b(), image_a()] {
@@ -42,7 +42,7 @@ fn the_first_image_is_on_no_trial_and_each_one_after_it_is() {
 }
 
 #[test]
-fn three_starts_that_nobody_asked_for_bring_the_image_before_back() {
+fn three_unrequested_starts_restore_the_previous_image() {
     for resets in [[Reset::Crash; 3], [Reset::Power; 3], [Reset::Power, Reset::Crash, Reset::Power]] {
         let mut flash = b_on_trial(1);
         let [first, second, third] = resets;
@@ -165,7 +165,7 @@ fn a_way_back_that_is_damaged_leaves_the_image_in_place() {
 }
 
 #[test]
-fn a_kept_image_that_nobody_has_signed_does_not_come_back() {
+fn an_unsigned_kept_image_is_not_restored() {
     let mut flash = flash_with(&image_a(), 1);
     let forged = Image { header: image_a().header, code: image_b().code };
     let header = update::Header::describe(description(1, 5), &forged.code).unwrap();
@@ -304,13 +304,16 @@ fn cut_everywhere(flash: &MockFlash, act: impl Fn(&mut MockFlash) -> bool, check
     println!("{cuts} cuts in {operations} operations");
 }
 
-/// What a master reads of the programs of a node, through an update that comes back and one that is confirmed.
+/// Values of 2004h during an update that is rolled back and one that is confirmed.
 #[test]
 fn the_programs_in_the_flash_are_known_through_return_and_confirmation() {
     let mut flash = flash_with(&image_a(), 1);
     let known = |flash: &mut MockFlash| Programs::read(flash, &target().layout, Clears::default());
     let [a, b] = [image_a(), image_b()].map(|image| image.header.code_crc());
-    assert_eq!(known(&mut flash), Programs { staged: a, erases: 2, clears_allowed: 50, ..Programs::default() });
+    assert_eq!(
+        known(&mut flash),
+        Programs { staged: a, erases: 2, clears_allowed: 50, ..Programs::default() }
+    );
     update(&mut flash, &image_b().bytes()).unwrap();
     assert_eq!((known(&mut flash).staged, known(&mut flash).kept), (b, a));
     withdraw(&mut flash);

@@ -85,7 +85,7 @@ const HOSTILE: [Hostile; 4] = [
     ("an accepted image again and again, each confirmed", ERASE + UPDATE, Node::replace),
 ];
 
-/// The erases of the worst sector in so many rounds, with these intervals of the budget after each.
+/// The erases of the worst sector in this number of rounds, with these intervals of the budget after each.
 fn wear(rounds: u32, intervals: u8, program: fn(&mut Node, u32)) -> u32 {
     let mut flash = MockFlash::new(&SECTORS, 1);
     update(&mut flash, &image_a().bytes()).unwrap();

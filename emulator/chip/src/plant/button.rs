@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn to_press_what_is_pressed_changes_nothing() {
+    fn a_press_of_a_pressed_button_changes_nothing() {
         let mut button = Button::default();
         button.set(false, Time::ZERO);
         assert!((0..5000).all(|micros| !button.is_closed(Time::from_micros(micros))));

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_of_speed_goes_on_from_the_position() {
+    fn a_change_of_speed_continues_from_the_position() {
         let mut shaft = turning(6000.0);
         shaft.set(Motion::Rpm(-600.0), Time::from_millis(25));
         assert_eq!(shaft.revolutions(Time::from_millis(25)), 2.5);

@@ -31,7 +31,7 @@ fn cycle(rig: &mut Rig, power: bool) {
 }
 
 #[test]
-fn all_of_it_is_memory() {
+fn all_words_are_memory() {
     let mut rig = rig();
     for n in 0..1024 {
         rig.write(BKPSRAM + 4 * n, 0x1234_0000 | n);
@@ -53,7 +53,7 @@ fn it_is_protected_until_the_program_says_otherwise() {
 }
 
 #[test]
-fn without_a_clock_it_is_not_there() {
+fn without_a_clock_the_memory_is_not_accessible() {
     let mut rig = rig();
     rig.write(BKPSRAM, 1);
     rig.write(AHB1ENR, 0);
@@ -75,7 +75,7 @@ fn it_outlives_a_reset_and_with_its_regulator_a_loss_of_power() {
 }
 
 #[test]
-fn without_its_regulator_it_outlives_a_reset_only() {
+fn without_the_regulator_the_memory_survives_a_reset_only() {
     let mut rig = rig();
     rig.write(PWR_CSR, 0);
     rig.write(BKPSRAM + 8, 0x1234_5678);
@@ -114,7 +114,7 @@ fn a_weak_battery_loses_some_bits() {
 }
 
 #[test]
-fn what_a_battery_has_kept_can_be_taken_out_and_put_back() {
+fn the_kept_memory_can_be_saved_and_restored() {
     let mut first = rig();
     first.write(BKPSRAM + 0x10, 0xCAFE_F00D);
     let kept = first.chip.kept_by_battery(first.now).expect("a battery");

@@ -60,7 +60,7 @@ fn over_drive_of_the_f446_is_ready_when_asked_for() {
 }
 
 #[test]
-fn the_cause_of_a_reset_stays_until_it_is_cleared() {
+fn the_cause_of_a_reset_stays_until_cleared() {
     let mut rig = Rig::new();
     assert_eq!(rig.read(CSR) >> 24, 0x0E, "power-on: BOR, PIN, POR");
     rig.write(CSR, 1 << 24);
@@ -86,7 +86,7 @@ fn an_access_without_clock_reads_zero_and_is_on_record() {
 }
 
 #[test]
-fn an_access_to_what_is_not_modelled_is_on_record_by_name() {
+fn an_access_without_a_model_is_recorded_by_name() {
     let mut rig = Rig::new();
     rig.set(APB1ENR, 1 << 1 | 1 << 17);
     for _ in 0..3 {
@@ -152,7 +152,7 @@ fn the_clock_security_system_switches_to_hsi_and_raises_nmi() {
 }
 
 #[test]
-fn without_the_clock_security_system_nobody_is_told() {
+fn without_the_clock_security_system_no_interrupt_occurs() {
     let mut rig = Rig::new();
     rig.firmware_clocks();
     rig.chip.plant_mut(rig.now).add_fault("no-crystal@0.01".parse().unwrap());

@@ -274,7 +274,7 @@ fn resolution_and_alignment_shape_the_code() {
 }
 
 #[test]
-fn what_the_converter_cannot_do_here_is_on_record() {
+fn unmodelled_functions_of_the_converter_are_recorded() {
     let mut rig = rig();
     rig.write(CR1, 1 << 23);
     rig.write(CR2, ADON | 1 << 22);
@@ -294,7 +294,7 @@ fn without_tsvrefe_the_internal_sensors_are_silent() {
 }
 
 #[test]
-fn a_value_nobody_fetches_is_an_overrun() {
+fn an_unread_value_is_an_overrun() {
     let mut rig = rig();
     start(&mut rig, 6, CIRCULAR & !(1 << 8));
     rig.wait(Time::from_millis(1));
@@ -304,7 +304,7 @@ fn a_value_nobody_fetches_is_an_overrun() {
 }
 
 #[test]
-fn an_overrun_is_over_when_it_is_cleared_and_the_stream_runs_again() {
+fn an_overrun_ends_when_cleared_and_the_stream_runs_again() {
     let mut rig = rig();
     start(&mut rig, 4, CIRCULAR & !(1 << 8));
     rig.wait(Time::from_millis(1));

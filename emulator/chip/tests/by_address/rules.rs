@@ -123,7 +123,7 @@ fn a_program_that_is_right_breaks_no_rule() {
 }
 
 #[test]
-fn every_seeded_bug_is_told() {
+fn every_seeded_bug_is_reported() {
     let pll = |m: u32, n: u32| 1 << 22 | n << 6 | m;
     let bugs = [
         (
@@ -208,7 +208,7 @@ fn every_seeded_bug_is_told() {
 }
 
 #[test]
-fn a_breach_is_told_once() {
+fn a_breach_is_reported_once() {
     let mut rig = Rig::new();
     for _ in 0..3 {
         rig.read(CAN1);
@@ -233,7 +233,7 @@ const DBGMCU_CR: u32 = 0xE004_2004;
 
 /// In RAM, at a multiple of eight, or without DBG_SLEEP a WFI is safe.
 #[test]
-fn a_sleep_in_flash_is_told_where_a_debugger_makes_it_unsafe() {
+fn a_sleep_in_flash_is_reported_where_a_debugger_makes_it_unsafe() {
     for (debugs, address, is_safe) in [
         (1, 0x0802_0208, true),
         (1, 0x0802_020A, false),

@@ -37,7 +37,7 @@ fn time_base(rig: &mut Rig) -> Time {
 }
 
 #[test]
-fn a_free_running_counter_tells_microseconds() {
+fn a_free_running_counter_counts_microseconds() {
     let mut rig = rig();
     let start = time_base(&mut rig);
     rig.run_to(start + Time(Time::PER_MICRO * 5 - 1));
@@ -183,7 +183,7 @@ fn a_stopped_counter_keeps_the_part_of_its_tick() {
 }
 
 #[test]
-fn what_a_timer_cannot_do_here_is_on_record() {
+fn unmodelled_functions_of_a_timer_are_recorded() {
     let mut rig = rig();
     rig.write(TIM3 + CR1, 1 << 4);
     rig.write(TIM3 + DIER, 1 << 8);

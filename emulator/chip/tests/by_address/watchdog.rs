@@ -103,7 +103,7 @@ fn each_chip_has_an_lsi_of_its_own() {
     }
 }
 
-/// While RVU is set, a reload takes the value before; while PVU is set, the count goes on with the prescaler before.
+/// While RVU is set, a reload takes the value before; while PVU is set, the count continues with the prescaler before.
 #[test]
 fn a_new_value_has_no_effect_before_its_update() {
     let mut rig = Rig::new();

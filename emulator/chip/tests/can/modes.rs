@@ -97,7 +97,7 @@ fn the_clock_makes_the_bit_rate() {
 }
 
 #[test]
-fn asleep_it_hears_a_start_of_frame_and_wakes_when_told_to() {
+fn a_sleeping_controller_detects_a_start_of_frame_and_wakes_on_command() {
     for (awum, stays) in [(0, SLAK), (AWUM, 0)] {
         let mut rig = Rig::new(1, 2);
         rig.initialise(0, ONE_MEGABIT);
@@ -145,7 +145,7 @@ fn loop_back_needs_no_bus_and_silent_mode_does_not_acknowledge() {
 }
 
 #[test]
-fn alone_on_the_bus_it_becomes_passive_and_stays_so() {
+fn alone_on_the_bus_the_controller_stays_error_passive() {
     let mut rig = Rig::started(1, 0, ABOM);
     rig.write(0, IER, 0xF << 8 | 1 << 15);
     rig.request(0, 0, &standard(0x700, &[0]));

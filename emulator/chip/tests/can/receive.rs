@@ -107,7 +107,7 @@ fn a_remote_frame_reads_without_data() {
 }
 
 #[test]
-fn a_frame_for_nobody_is_acknowledged_all_the_same() {
+fn a_filtered_frame_is_acknowledged() {
     let mut rig = Rig::started(1, 1, 0);
     rig.write(0, FA1R, 0);
     flood(&mut rig, 1);

@@ -41,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_mapped_otherwise_is_shown_as_it_is() {
+    fn other_mappings_are_shown_as_bytes() {
         assert_eq!(shown(Personality::Pressure, Some(&[0x12, 0xAB])), "12AB");
         assert_eq!(shown(Personality::Encoder, Some(&[])), "");
         assert_eq!(shown(Personality::Lift, None), "none");

@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_line_of_the_log_goes_on_in_the_next() {
+    fn a_long_line_of_the_log_is_wrapped() {
         let mut view = view();
         view.log("x".repeat(100) + "end");
         assert!(drawn(&view, 80, 24).contains("xend"));

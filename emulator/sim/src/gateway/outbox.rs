@@ -97,7 +97,7 @@ impl Outbox {
 mod tests {
     use super::*;
 
-    /// A client that accepts this many bytes per write and blocks after so many writes.
+    /// A client that accepts this many bytes per write and blocks after this number of writes.
     struct Narrow {
         width: usize,
         writes: usize,
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_segment_stands_alone_and_what_follows_waits() {
+    fn a_segment_is_sent_alone_and_further_frames_wait() {
         let (mut outbox, mut client, now) = (Outbox::default(), wide(), Instant::now());
         outbox.stream("a");
         outbox.stream("b");
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_client_that_does_not_read_fills_it_and_the_memory_is_given_back() {
+    fn a_client_that_does_not_read_fills_the_outbox_and_the_memory_is_freed() {
         let mut client = Narrow { writes: 0, ..wide() };
         let (mut outbox, now) = (Outbox::default(), Instant::now());
         while outbox.has_room() {

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_channel_state_forbids_is_refused() {
+    fn commands_in_a_wrong_channel_state_are_refused() {
         for text in ["t1230\r", "F\r"] {
             assert_eq!(talk(&mut Slcan::new(250_000), text), [Action::stream("\x07")], "{text:?}");
         }

@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_refused_and_how() {
+    fn refused_commands_have_their_answers() {
         let mut session = Socketcand::new("vcan0", 250_000);
         let mut refused = |text, why| {
             assert_eq!(talk(&mut session, text), [Action::segment(format!("< error {why} >"))], "{text}");
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn broadcast_mode_reports_what_was_subscribed() {
+    fn broadcast_mode_reports_subscribed_frames() {
         let mut session = Socketcand::new("vcan0", 250_000);
         talk(&mut session, "< open vcan0 >< subscribe 0 0 701 >");
         let heartbeat = standard(0x701, &[5, 6]);

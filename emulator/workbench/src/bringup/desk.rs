@@ -28,7 +28,7 @@ pub struct EmulatedDesk {
     network: Network,
     programs: Vec<Part>,
     image: Image,
-    /// What the hands do wrong, or what is wired wrongly.
+    /// A mistake of the operator, or of the wiring.
     pub mistake: Option<Mistake>,
 }
 

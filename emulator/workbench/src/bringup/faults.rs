@@ -23,7 +23,7 @@ pub enum Kind {
 
 /// A fault.
 pub struct Fault {
-    /// What is broken.
+    /// The broken part.
     pub name: &'static str,
     /// The step that is red.
     pub step: &'static str,

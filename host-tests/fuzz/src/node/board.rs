@@ -172,7 +172,7 @@ impl Board {
     }
 
     /// Starts with a new monitor: frames were lost, or the bus has stopped the node.
-    fn watch_anew(&mut self) {
+    fn watch_again(&mut self) {
         self.watch = Watch::new(self.personality, self.node_id());
     }
 
@@ -195,14 +195,14 @@ impl Board {
             }
             Step::Bus(report) => {
                 let _ = self.protocol.bus_event(report.into(), self.now);
-                self.watch_anew();
+                self.watch_again();
             }
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(congestion) => {
                 let (is_congested, length) = Step::queue(congestion);
                 self.out = Queue { waiting: vec![], is_congested, length };
-                self.watch_anew();
+                self.watch_again();
             }
             Step::PowerCycle => self.power_on(self.retained()),
             Step::PowerCut { after } => self.flash.cut_after(after),

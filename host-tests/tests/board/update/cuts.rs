@@ -19,7 +19,7 @@ const MARK: u32 = 0x2001_0000;
 const NO_CUT: u64 = u64::MAX >> 1;
 /// Operations of the copy of B: a sector erase, the words of the program, the mark of completion.
 const COPY: u64 = 1 + 133 + 1;
-/// Of this many cuts in the copy, two are followed by a second cut.
+/// Two of this many cuts in the copy are followed by a second cut.
 const SECOND_CUTS: u64 = 7;
 /// The longest recovery: two erases, and a start; in steps of 20 ms.
 const PATIENCE: u32 = 300;
@@ -125,7 +125,7 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
 /// Without `--thorough`, one of this many operations is cut.
 const SAMPLE: u64 = 20;
 
-/// Of the operations that keep A, one of this many is cut, except for those at the begin and the end.
+/// One of this many operations that keep A is cut, except for those at the begin and the end.
 const KEEPING_SAMPLE: u64 = 2001;
 const ENDS: u64 = 6;
 
@@ -195,7 +195,7 @@ fn the_power_goes_at_every_odd_operation_of_an_update() {
 
 /// Both programs are real applications here, so each of them answers.
 #[test]
-fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
+fn after_any_power_cut_the_node_starts_one_of_the_two_programs() {
     let cuts = either(4, 8);
     let (a, b) = (version_a(), version_b(0));
     let words = (b.to_bytes().len() / 4) as u64;

@@ -138,7 +138,7 @@ fn one_image_updates_every_personality() {
         let flags = format!("--bitrate {kbit} --node {node}:{personality}");
         let world = share(world(&flags));
         let (a, b) = (version_a(), version_b(0));
-        // `nodectl_updates_to_b_and_back` has the way back in each run.
+        // `nodectl_updates_to_b_and_back` has the rollback in each run.
         for [from, to] in either(vec![[&a, &b]], vec![[&a, &b], [&b, &a]]) {
             assert_eq!(update(&world, &node.to_string(), to, None), [updated(node, [from, to])], "{flags}");
         }
@@ -155,7 +155,7 @@ fn nodectl(world: &Shared, node: u8, command: &str) -> Result<Value, String> {
 }
 
 #[test]
-fn nodectl_confirms_a_program_on_trial_or_rolls_it_back() {
+fn nodectl_confirms_or_rolls_back_a_program_on_trial() {
     let (a, b) = (version_a(), version_b(0));
     let all: Vec<_> = PERSONALITIES.into_iter().zip([1000, 125, 250, 500]).collect();
     for (personality, kbit) in either(vec![all[0], all[3]], all) {

@@ -47,7 +47,7 @@ fn a_node_is_updated_to_b_and_back() {
 /// The update time compared with the time of the frames on the wire, including erase and programming. At one bit rate
 /// without `--thorough`.
 #[test]
-fn an_update_takes_what_the_wire_takes() {
+fn an_update_takes_the_time_of_its_frames() {
     /// The times of the frames alone, for 127.5 KiB in blocks of 127 segments at 116 bits a frame.
     const WIRE: [(u32, f64); 3] = [(1000, 2.18), (500, 4.36), (250, 8.73)];
     let image = signed(noise(LAYOUT.longest_image() as usize - HEADER_LEN), |_| ()).to_bytes();
@@ -115,7 +115,7 @@ fn without_an_application_the_node_is_where_its_record_says() {
 /// An application written with a debugger: its checksums are right, but the signature is missing. Neither a power cycle
 /// nor a master starts it.
 #[test]
-fn an_application_that_nobody_has_signed_does_not_start() {
+fn an_unsigned_application_does_not_start_on_the_board() {
     let mut bench = Bench::running();
     let image = version_b(0);
     let unsigned = [&image.header.with_signature([0; 64]).encode()[..], &image.code].concat();

@@ -84,7 +84,7 @@ fn it_was_built_with_the_owner_s_keys() {
 }
 
 #[test]
-fn it_takes_what_its_owner_has_signed_and_nothing_else() {
+fn the_bootloader_of_an_owner_accepts_only_the_owners_images() {
     let mut bench = bench();
     // The application on the emulated board is signed with the development key: this bootloader does not start it.
     assert_eq!(bench.settled().code, SIGNATURE);

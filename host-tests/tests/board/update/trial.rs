@@ -108,7 +108,7 @@ fn a_program_that_does_not_start_is_replaced_by_the_one_before_with_its_settings
 }
 
 #[test]
-fn a_program_that_nobody_has_confirmed_in_time_is_replaced_by_the_one_before() {
+fn an_unconfirmed_program_is_rolled_back_in_time() {
     let mut bench = Bench::running();
     write(&mut bench, LIMIT, &[12, 0]).unwrap();
     write(&mut bench, SAVE, b"save").unwrap();
@@ -118,7 +118,7 @@ fn a_program_that_nobody_has_confirmed_in_time_is_replaced_by_the_one_before() {
 }
 
 #[test]
-fn where_it_is_automatic_a_program_confirms_itself_without_a_master() {
+fn with_automatic_confirmation_a_program_needs_no_master() {
     let mut bench = Bench::running();
     for (at, seconds) in [(LIMIT, 12), (AUTOMATIC, 5)] {
         write(&mut bench, at, &[seconds, 0]).unwrap();
@@ -145,7 +145,7 @@ fn three_times_without_power_before_a_confirmation_bring_the_program_before_back
 }
 
 #[test]
-fn a_master_confirms_a_program_or_takes_it_back_and_nothing_is_stored_before() {
+fn a_master_confirms_or_rolls_back_and_nothing_is_stored_before() {
     let mut bench = Bench::running();
     bench.update(&version_b(0));
     assert_eq!(write(&mut bench, SAVE, b"save"), Err(Failure::Refused(0x0800_0022)), "on trial");
@@ -218,7 +218,7 @@ fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
 
 /// Power cuts at some operations of the return: A runs after each of them.
 #[test]
-fn the_power_goes_on_the_way_back() {
+fn the_power_is_cut_during_a_rollback() {
     let _expected = expects([Rule::HeartbeatLate]);
     let mut bench = Bench::running();
     bench.update(&version_b(0));

@@ -14,7 +14,7 @@ use crate::values::{self, COMMANDS};
 /// A value without effect on the measurement: the heartbeat time.
 const SAVED: (u16, u8) = (0x1017, 0);
 const SAVE: (u16, u8) = (0x1010, 2);
-/// What the bound of the stack leaves of it in bytes (`cargo xtask stack`), rounded down.
+/// The free part of the stack beside its bound in bytes (`cargo xtask stack`), rounded down.
 const FREE_STACK: u32 = 2000;
 /// The longest erase of 16 KiB in microseconds (STM32F446 datasheet, flash memory programming).
 const LONGEST_ERASE: u32 = 500_000;
@@ -129,7 +129,7 @@ fn crashes(bench: &mut Bench<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Nobody watches the progress.
+/// The progress is not shown.
 struct Silent;
 
 impl Watcher for Silent {

@@ -43,7 +43,7 @@ pub(super) fn causes(bench: &mut Bench<'_>) -> Result<()> {
     }
     let (flags, tries) = (bench.self_test(values::RESET_FLAGS)?, bench.self_test(values::CLOCK_TRIES)?);
     bench.remark("RCC_CSR at the last start (2005h)", format!("{flags:08X}h"), "the cause in the log", "");
-    // The upper half is the complement; the word of a RAM without it is none.
+    // The upper half is the complement; the word of a RAM without it is not valid.
     let tries = if tries >> 16 == !tries & 0xFFFF { tries & 0xFFFF } else { 0 };
     bench.remark("resets without a clock on OSC_IN (2005h)", tries, "0; some with an ST-LINK", "");
     let first = bench.object(0x1003, 0)?;
@@ -112,7 +112,13 @@ fn lsi(bench: &mut Bench<'_>, time_out: f64) -> Result<()> {
     const WHAT: &str = "LSI by TIM5 (2005h)";
     let Some(hertz) = bench.start_test(WHAT, values::LSI)? else { return Ok(()) };
     let kilohertz = f64::from(hertz) / 1000.0;
-    bench.check_range(WHAT, kilohertz, LSI, "kHz", "Outside of the data sheet: another chip of the same type");
+    bench.check_range(
+        WHAT,
+        kilohertz,
+        LSI,
+        "kHz",
+        "Outside of the data sheet: another chip of the same type",
+    );
     let expected = 32.0 * NOMINAL / kilohertz.max(1.0);
     let range = (expected * 0.8, expected * 1.1);
     bench.check_range(

@@ -103,8 +103,8 @@ pub(super) fn analogue(bench: &mut Bench<'_>) -> Result<()> {
     lost_events(bench)
 }
 
-/// The noise of the pressure without prefetch: it disturbs the converter on some boards (AN4073). The better setting is for
-/// whoever builds the product.
+/// The noise of the pressure without prefetch: it disturbs the converter on some boards (AN4073). The maker of the product selects
+/// the better setting.
 fn noise_without_prefetch(bench: &mut Bench<'_>) -> Result<()> {
     let settings = bench.word(chip::FLASH_ACR)?;
     bench.desk.write(chip::FLASH_ACR, settings & !PREFETCH)?;

@@ -193,7 +193,7 @@ impl Session {
     }
 
     /// The catalogue of a node with this identity. A file that the user has named for one node is used for it, and the
-    /// user is told when it is for another device.
+    /// user is warned when it is for another device.
     pub(super) fn catalogue_of(&mut self, node: NodeId, device: Device) -> Result<Catalogue, Failure> {
         let is_for_all = !self.has_many_nodes;
         let sheets = self.sheets()?;

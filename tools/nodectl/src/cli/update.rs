@@ -30,7 +30,7 @@ pub(super) struct Update {
     #[arg(long)]
     force: bool,
 
-    /// The file is of another format: download it as it is, with no check of board and version.
+    /// The file is of another format: download it unchanged, without a check of board and version.
     #[arg(long)]
     raw: bool,
 

@@ -140,7 +140,7 @@ fn sheet() -> String {
 }
 
 #[test]
-fn the_second_sdo_server_is_used_where_it_is_switched_on() {
+fn the_second_sdo_server_is_used_where_enabled() {
     for (cob_ids, id) in [
         ([0x641, 0x5C1], 0x641),
         ([0x8000_0641, 0x8000_05C1], 0x601),

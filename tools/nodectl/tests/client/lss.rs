@@ -69,7 +69,7 @@ fn a_node_is_selected_by_its_identity() {
 }
 
 #[test]
-fn what_is_not_selected_does_not_answer() {
+fn slaves_that_are_not_selected_do_not_answer() {
     let mut network = Wire::new(Pressure::new(5)).network();
     let mut master = master(&mut network);
     master.release().unwrap();

@@ -76,7 +76,7 @@ fn only_this_server_s_own_page_gets_the_token_and_only_the_token_writes() {
 }
 
 #[test]
-fn a_name_that_somebody_points_at_this_machine_gets_nothing() {
+fn a_foreign_name_of_this_machine_gets_nothing() {
     let bench = Bench::new();
     let port = bench.address().port();
     let own = format!("Host: 127.0.0.1:{port}");
@@ -161,7 +161,7 @@ fn whatever_others_do_a_page_loses_nothing() {
 /// Connections that send requests and read no answer, with and without a valid `Host`, take every place. A page connects all
 /// the same.
 #[test]
-fn connections_that_read_nothing_lock_nobody_out() {
+fn connections_that_read_nothing_lock_no_client_out() {
     let bench = Bench::new();
     let own = bench.address().to_string();
     let deaf: Vec<_> = (0..200)
@@ -197,7 +197,7 @@ fn pages_without_the_token_leave_places() {
 }
 
 #[test]
-fn a_page_that_is_let_go_gets_what_was_said_before() {
+fn a_released_page_gets_the_messages_before() {
     let bench = Bench::new();
     let (mut socket, page, _) = bench.page("");
     assert!(socket.send(2, &[1, 2, 3]));

@@ -17,7 +17,7 @@ struct Cli {
     /// Sectors 0 and 1 can be neither erased nor programmed
     #[arg(long)]
     bootloader: bool,
-    /// Level 1: no debugger reads or programs the flash. The way back erases all of it. (Level 2 is not offered)
+    /// Level 1: no debugger reads or programs the flash. The removal erases the flash. (Level 2 is not offered)
     #[arg(long)]
     readout: bool,
     /// The chip is held in reset below 2.7 V, which the flash needs at this clock
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_erases_everything_says_so() {
+    fn an_option_that_erases_the_flash_reports_it() {
         let new = OptionBytes::FACTORY;
         let closed = new.with_read_out(true);
         assert_eq!(consequences(new, new.with_bootloader(true)).len(), 1);

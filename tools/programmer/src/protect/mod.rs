@@ -2,7 +2,7 @@
 //! programming, and the whole flash against reading (docs/update.md, Protection).
 //!
 //! A debug probe sets the protections, not the bootloader at its first start. Code that can write option bytes can go
-//! wrong in the field, where nobody can correct them, and an attacker can use such code. A probe is needed anyway when
+//! wrong in the field, where they cannot be corrected, and an attacker can use such code. A probe is needed anyway when
 //! a board gets its bootloader, and its user sees at once whether the setting has worked.
 
 mod option_bytes;

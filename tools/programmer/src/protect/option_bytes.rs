@@ -26,7 +26,7 @@ pub struct OptionBytes(u32);
 pub enum ReadOut {
     /// Level 0: the whole flash.
     Open,
-    /// Level 1: nothing. The way back to level 0 erases the flash.
+    /// Level 1: nothing. The return to level 0 erases the flash.
     Protected,
     /// Level 2: no debugger can connect, and the option bytes cannot be changed any more.
     Final,
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_is_asked_for_changes_and_it_comes_back() {
+    fn only_requested_bits_change_and_can_be_restored() {
         let new = OptionBytes::FACTORY;
         assert_eq!((new.keeps_bootloader(), new.read_out()), (false, ReadOut::Open));
         let kept = new.with_bootloader(true);

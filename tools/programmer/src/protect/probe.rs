@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_word_is_found_in_what_probe_rs_prints() {
+    fn the_word_is_found_in_the_output_of_probe_rs() {
         for text in ["0fffaaed\n", "0fffaaed \n", "0x0fffaaed", "40023c14: 0fffaaed\n"] {
             assert_eq!(word(text), Some(0x0FFF_AAED), "{text}");
         }

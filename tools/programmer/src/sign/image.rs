@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 use ed25519_dalek::{Digest, Sha512, Signature, SigningKey, VerifyingKey};
 use update::{CONTEXT, Description, HEADER_LEN, Header};
 
-/// An image as it is downloaded: header and code.
+/// An image in the form of a download: header and code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// The header.

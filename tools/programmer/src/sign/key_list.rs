@@ -19,7 +19,7 @@ fn certify(generation: u32, counter: u32, key: &VerifyingKey, by: &SigningKey) -
 /// of a root key that is in `before`. From `counter` on the release key raises the security counter.
 ///
 /// # Errors
-/// The number is none of a release key, or another root key is in `before`.
+/// The number is not that of a release key, or another root key is in `before`.
 pub fn with_release(
     before: KeyList,
     key: &VerifyingKey,
@@ -44,7 +44,7 @@ pub fn with_release(
 /// A list in which the recovery key `by` certifies the root key with this number, 1 to 3. It has no release key yet.
 ///
 /// # Errors
-/// The number is none of a root key.
+/// The number is not that of a root key.
 pub fn with_root(key: &VerifyingKey, number: u32, by: &SigningKey) -> Result<KeyList> {
     let highest = update::key::GENERATIONS / RELEASES - 1;
     ensure!((1..=highest).contains(&number), "a root key has a number from 1 to {highest}");

@@ -12,7 +12,7 @@ use crate::{Duration, Frame, Instant};
 /// All slaves that match a question answer with the same frame, so the number of slaves does not matter. Silence means
 /// that the bit is 1. A question takes the whole time-out. After an answer it takes another quarter of the time-out,
 /// because other slaves may answer a little later. A lost answer makes the identity wrong; the question at the end of
-/// each part detects this, and the search begins anew, as often as [`Options::retries`] allows.
+/// each part detects this, and the search restarts, as often as [`Options::retries`] allows.
 #[derive(Clone, Copy, Debug)]
 pub struct Fastscan {
     options: Options,
@@ -73,7 +73,7 @@ impl Fastscan {
             Question::Release => Some(switch_global(false)),
             Question::Anybody => fastscan(0, Request::CONFIRM, 0, 0),
             Question::Bit(part, bit) => fastscan(self.part(part), bit, part, part),
-            // The slave goes on to the next part. After the last part, the slave is selected.
+            // The slave continues with the next part. After the last part, the slave is selected.
             Question::Part(part) => fastscan(self.part(part), 0, part, (part + 1) % 4),
             Question::Over(_) => None,
         }

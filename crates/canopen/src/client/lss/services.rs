@@ -32,7 +32,7 @@ pub fn select(identity: &Identity, options: Options) -> Exchange<()> {
 }
 
 /// Identify non-configured remote slaves: asks whether there is a slave without a node-ID. All such slaves answer with
-/// the same frame. The result is [`Error::NoAnswer`] when there is none.
+/// the same frame. The result is [`Error::NoAnswer`] without an answer.
 #[must_use]
 pub fn identify_unconfigured(options: Options) -> Exchange<()> {
     let interpret = |_, response| (response == Response::Unconfigured).then_some(Ok(()));

@@ -76,7 +76,7 @@ impl Link {
         self.patience = self.options.timeout;
     }
 
-    /// Tells the server that the transfer is over. The server does not answer an abort message.
+    /// Ends the transfer at the server. The server does not answer an abort message.
     pub(super) fn give_up(&mut self, code: AbortCode) {
         self.outgoing = Some(Request::Abort(self.at, code.0).encode());
     }

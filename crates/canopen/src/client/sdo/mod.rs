@@ -6,7 +6,7 @@
 //! | in blocks of up to 127 segments, with a CRC | [`BlockUpload`] | [`BlockDownload`] |
 //!
 //! All four are a [`Service`](super::Service). Lost segments of a block are sent again. A transfer whose answer is lost
-//! is aborted and begun anew, as often as [`Options`] allow. One time limit covers all attempts.
+//! is aborted and restarted, as often as [`Options`] allow. One time limit covers all attempts.
 
 mod abort_code;
 mod block_download;

@@ -10,7 +10,7 @@ pub struct Options {
     pub timeout: Duration,
     /// The longest time of a transfer, including retries.
     pub limit: Duration,
-    /// How often a transfer is begun anew when an answer is missing or does not fit.
+    /// How often a transfer is restarted when an answer is missing or does not fit.
     pub retries: u8,
     /// Segments in a block of a block upload, 1 to 127.
     pub block_size: BlockSize,

@@ -18,7 +18,7 @@ pub trait Protocol {
     /// The transfer has failed.
     fn on_response(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error>;
 
-    /// The next segment of a block; `None` when there is none to send.
+    /// The next segment of a block; `None` when all are sent.
     fn segment(&mut self, _: &mut Link) -> Option<[u8; 8]> {
         None
     }
@@ -38,7 +38,7 @@ pub trait Protocol {
 /// The effect of an answer on the transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// The transfer goes on.
+    /// The transfer continues.
     Continues,
     /// The transfer is complete; one last frame may remain to be sent.
     Complete,
@@ -52,7 +52,7 @@ enum Phase {
     /// Nothing has been sent.
     New,
     Running,
-    /// The server is told that this attempt is over; then the next attempt begins.
+    /// An abort message ends this attempt at the server; then the next attempt begins.
     Again,
     Over(Result<(), Error>),
 }
@@ -78,13 +78,13 @@ impl<P: Protocol> Transfer<P> {
         Transfer { protocol, link, phase: Phase::New, end: Instant::NEVER, retries }
     }
 
-    /// How many bytes the receiver has taken so far. A transfer that is begun anew counts from 0 again.
+    /// How many bytes the receiver has taken so far. A restarted transfer counts from 0 again.
     #[must_use]
     pub fn transferred(&self) -> usize {
         self.protocol.transferred()
     }
 
-    /// Cancels the transfer. The next step tells the server.
+    /// Cancels the transfer. The next step sends an abort message.
     pub fn abort(&mut self) {
         if !matches!(self.phase, Phase::Over(_)) {
             self.fail(Error::Cancelled);

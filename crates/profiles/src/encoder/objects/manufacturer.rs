@@ -117,7 +117,7 @@ pub(crate) const SENSORS: &[Object] = &[
     Object::highest(0x2113, 2, "Cam delay compensations"),
     parameter(0x2113, 1, "Cam delay compensation channel 1", Type::Integer16).unit("0.1 ms"),
     parameter(0x2113, 2, "Cam delay compensation channel 2", Type::Integer16).unit("0.1 ms"),
-    // 6001h units are so many revolutions of the sensor.
+    // 6001h units are this number of revolutions of the sensor.
     sensor(0x2114, 0, "Gear factor", Type::Unsigned16).limits(1, 0xFFFF).value(1),
     // The digital input that makes a preset; 0: none.
     Object::highest(0x2115, 2, "Preset inputs"),

@@ -84,7 +84,7 @@ fn every_parameter_is_saved_and_nothing_else() {
 }
 
 #[test]
-fn every_parameter_changes_what_the_measurement_gets() {
+fn every_parameter_reaches_the_measurement() {
     // Values that differ from the default, are allowed, and keep the rest allowed.
     let special = |index, sub| match (index, sub) {
         (0x6000, _) => 2,

@@ -161,7 +161,7 @@ impl Channel {
     }
 }
 
-/// What a channel has done since the last sample.
+/// Events of a channel since the last sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reports {
     /// The position that was last worth a TPDO of type 255.

@@ -146,7 +146,7 @@ impl Fields {
         }
     }
 
-    /// Whether an object belongs to a virtual device, and to a unit of it, that the node has.
+    /// Whether an object belongs to a virtual device, and to one of its units, that the node has.
     #[inline(never)]
     pub(super) fn is_there(&self, at: Multiplexer, image: &[u8]) -> bool {
         let devices = self.devices(image);

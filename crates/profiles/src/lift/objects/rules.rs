@@ -80,7 +80,7 @@ impl Fields {
             let position = unit.position.u32(image);
             let turned = self.position_parameters(image).turned(number, position);
             unit.offset.store(image, turned.unwrap_or(0).to_le_bytes());
-            // The other direction leaves a position as it is; one that is not known needs a preset.
+            // The other direction does not change a position; an unknown one needs a preset.
             if unit.state.u8(image) & (UNKNOWN | NOT_REFERENCED) != 0 && unit.references.u8(image) != 0 {
                 unit.references.store(image, [NO_OFFSET]);
             }

@@ -139,7 +139,7 @@ fn every_parameter_is_saved_and_nothing_else() {
 /// Except for the trial of a program, the words of the panel and the lift number, which do not concern the measurement,
 /// and the values that a preset and a reference weight leave behind.
 #[test]
-fn every_parameter_changes_what_the_measurement_gets() {
+fn every_parameter_reaches_the_measurement() {
     let silent = [0x2002, 0x2320, 0x2321, 0x6001, 0x6100, 0x6120, 0x6200, 0x6382, 0x6486];
     let special = |index, sub| match (index, sub) {
         (0x2105 | 0x2301, _) | (0x2103, 3) => 0,
@@ -270,7 +270,7 @@ fn the_load_is_signalled_and_its_reference_is_the_load_of_now() {
 }
 
 #[test]
-fn what_is_not_weighed_is_no_reference() {
+fn an_unmeasured_load_is_no_reference() {
     let mut node = Node::new();
     node.inputs.analogue.pressure = 0;
     node.sample();
@@ -374,7 +374,7 @@ fn a_button_that_is_not_used_says_nothing() {
 
 /// A button that is switched off while it is pressed.
 #[test]
-fn a_call_that_was_told_ends_with_its_button() {
+fn a_sent_call_ends_with_its_button() {
     let mut node = Node::new();
     node.write(0x2305, 0, 4).unwrap();
     node.write(0x2320, 1, 0x12).unwrap();
@@ -389,7 +389,7 @@ fn a_call_that_was_told_ends_with_its_button() {
 
 /// Lit by lift 2 and put out by a multiplexed PDO: lift 2 no longer counts.
 #[test]
-fn a_lamp_that_a_pdo_has_put_out_is_lit_by_nobody() {
+fn a_lamp_switched_off_by_a_pdo_stays_off() {
     let mut node = Node::new();
     node.write(0x2305, 0, 8).unwrap();
     let word = |lift: i64, light: i64| 0x0405 | lift << 16 | 0xFF << 24 | 0x0F << 32 | light << 40;
@@ -547,7 +547,7 @@ fn the_choice_of_virtual_devices() {
 
 /// The stored PDO parameters may be older than the stored choice.
 #[test]
-fn a_reset_silences_what_is_not_chosen() {
+fn a_reset_silences_deselected_devices() {
     let mut node = Node::new();
     node.write(0x2305, 0, 3).unwrap();
     DICTIONARY.field(0x2305, 0).set(&mut node.image, &[2]);

@@ -41,8 +41,13 @@ pub(super) const CHECKS: &[Check] = &[
     ),
     Check::new("SDO-16", "An abort names the object", "CiA 301, 7.2.4.3.17", names_refused),
     Check::new("SDO-17", "An abort of the client gets no answer", "CiA 301, 7.2.4.3.17", abort_is_silent),
-    Check::new("SDO-18", "An upload in one frame tells its size", "CiA 301, 7.2.4.3.6", size_is_told)
-        .recommended(),
+    Check::new(
+        "SDO-18",
+        "An upload in one frame tells its size",
+        "CiA 301, 7.2.4.3.6",
+        response_has_its_size,
+    )
+    .recommended(),
     Check::new("SDO-19", "Reserved bytes of a response are 0", "CiA 301, 7.2.4.3.3", reserved),
     Check::new(
         "SDO-20",
@@ -53,7 +58,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("SDO-21", "A request gets one answer", "CiA 301, 7.2.4.2", one_answer),
     Check::new("SDO-22", "The answer comes within 100 ms", "CiA 301, 7.2.4", soon).recommended(),
     Check::new("SDO-23", "A refused write changes nothing", "CiA 301, 7.2.4.2", refused_changes_nothing),
-    Check::new("SDO-24", "What was written is read", "CiA 301, 7.2.4.2", reads_what_was_written),
+    Check::new("SDO-24", "What was written is read", "CiA 301, 7.2.4.2", written_value_reads_back),
 ];
 
 fn upload(s: &mut Subject<'_>) -> Outcome {
@@ -166,7 +171,7 @@ fn abort_is_silent(s: &mut Subject<'_>) -> Outcome {
     ensure(answer.is_none(), "no answer", format!("{:02X?}", answer.unwrap_or_default()))
 }
 
-fn size_is_told(s: &mut Subject<'_>) -> Outcome {
+fn response_has_its_size(s: &mut Subject<'_>) -> Outcome {
     let answer = s.answer(Request::Upload(at(0x1000, 0)).encode())?;
     ensure(answer[0] == 0x43, "43h: four bytes, and their number is told", format!("{answer:02X?}"))
 }
@@ -215,7 +220,7 @@ fn refused_changes_nothing(s: &mut Subject<'_>) -> Outcome {
     Ok(())
 }
 
-fn reads_what_was_written(s: &mut Subject<'_>) -> Outcome {
+fn written_value_reads_back(s: &mut Subject<'_>) -> Outcome {
     s.need_writable(0x1017, 0)?;
     for value in [5000, 0, 1234] {
         s.set(0x1017, 0, value)?;

@@ -37,7 +37,7 @@ pub(super) const CHECKS: &[Check] = &[
         "CiA 301, 7.2.4.3.17",
         aborted_download,
     ),
-    Check::new("SDO-46", "A new transfer may begin in the middle of one", "CiA 301, 7.2.4.2", begun_anew)
+    Check::new("SDO-46", "A new transfer may begin in the middle of one", "CiA 301, 7.2.4.2", begun_again)
         .recommended(),
     Check::new(
         "SDO-47",
@@ -181,7 +181,7 @@ fn aborted_download(s: &mut Subject<'_>) -> Outcome {
     s.holds(0x1017, 0, before)
 }
 
-fn begun_anew(s: &mut Subject<'_>) -> Outcome {
+fn begun_again(s: &mut Subject<'_>) -> Outcome {
     let index = long(s)?;
     s.begin_segmented_upload(index, 0)?;
     let answer = s.answer(Request::Upload(at(0x1000, 0)).encode())?;

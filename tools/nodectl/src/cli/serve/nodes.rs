@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn an_identity_is_learned_from_what_other_clients_read() {
+    fn an_identity_is_learned_from_uploads_of_other_clients() {
         let mut identity = Identity::default();
         let at = crate::object::at;
         assert!(!identity.hear(at(0x1017, 0), &[1, 0]));
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn an_emergency_is_told_and_over_with_no_error() {
+    fn an_emergency_is_reported_and_ends_with_no_error() {
         let mut nodes = Nodes::default();
         let news = nodes.on_frame(&frame(0x085, &[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]), 1.0).unwrap();
         let told = serde_json::to_value(&news).unwrap();
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_has_changed_is_told() {
+    fn only_changes_are_reported() {
         let mut nodes = Nodes::default();
         nodes.on_frame(&frame(0x701, &[5]), 0.0);
         nodes.on_frame(&frame(0x702, &[5]), 0.0);

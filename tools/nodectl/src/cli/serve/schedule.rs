@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn what_needs_everything_waits_for_all_and_is_not_overtaken() {
+    fn an_exclusive_job_waits_for_all_and_is_not_overtaken() {
         let mut schedule = Schedule::default();
         schedule.add(node(1), Haste::Asked, None, "a");
         schedule.add(Lane::Everything, Haste::Asked, None, "b");
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_good_to_know_comes_one_at_a_time_and_last() {
+    fn background_reads_run_one_at_a_time_and_last() {
         let mut schedule = Schedule::default();
         schedule.add(node(1), Haste::Background, None, "a");
         schedule.add(node(2), Haste::Background, None, "b");

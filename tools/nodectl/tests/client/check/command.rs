@@ -132,7 +132,7 @@ fn unknown_checks_and_silent_nodes_are_reported() {
 
 /// Values, mappings, saved values and the state are as before the run.
 #[test]
-fn a_whole_run_leaves_the_device_as_it_was() {
+fn a_whole_run_restores_the_device() {
     let (eds, wire) = (sheet("as-before.eds"), good());
     for line in [
         &["write", "1017", "700"][..],

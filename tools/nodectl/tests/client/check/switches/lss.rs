@@ -22,7 +22,7 @@ fn tells_otherwise(command: u8, byte: usize, value: u8) -> Layer {
 }
 
 /// Always gives this answer to requests with this command.
-fn always_tells(command: u8, answer: u8) -> Layer {
+fn always_fails_a_check(command: u8, answer: u8) -> Layer {
     replies(move |look| {
         let is_it = look.frame.id() == ASKED && look.frame.data().first() == Some(&command);
         is_it.then(|| frame(TOLD, &[answer, 0, 0, 0, 0, 0, 0, 0]))
@@ -54,19 +54,19 @@ pub(super) fn switches() -> Vec<Switch> {
         fault("tells another revision by LSS", &["LSS-08"], tells_otherwise(0x5C, 1, 0x55)),
         fault("tells another serial number by LSS", &["LSS-09"], tells_otherwise(0x5D, 1, 0x55)),
         fault("tells another node-ID by LSS", &["LSS-10"], tells_otherwise(0x5E, 1, 0x55)),
-        fault("tells its node-ID to everybody", &["LSS-11"], always_tells(0x5E, 0x5E)),
+        fault("tells its node-ID to everybody", &["LSS-11"], always_fails_a_check(0x5E, 0x5E)),
         fault(
             "is not identified",
             &["LSS-12"],
             loses(|look| look.is(Way::Out, TOLD) && look.frame.data().first() == Some(&0x4F)),
         ),
-        fault("is identified out of its range", &["LSS-13"], always_tells(0x4B, 0x4F)),
-        fault("says that it has no node-ID", &["LSS-14"], always_tells(0x4C, 0x50)),
+        fault("is identified out of its range", &["LSS-13"], always_fails_a_check(0x4B, 0x4F)),
+        fault("says that it has no node-ID", &["LSS-14"], always_fails_a_check(0x4C, 0x50)),
         fault("leaves rubbish in the bytes of LSS", &["LSS-15"], tells_otherwise(0x5E, 7, 0x55)),
         fault("takes any node-ID", &["LSS-20", "LSS-21", "LSS-23"], tells_otherwise(0x11, 1, 0)),
         fault("refuses its own node-ID", &["LSS-22"], tells_otherwise(0x11, 1, 1)),
         fault("takes any bit rate", &["LSS-24", "LSS-25", "LSS-26"], tells_otherwise(0x13, 1, 0)),
-        fault("answers an unknown service of LSS", &["LSS-27"], always_tells(0x3A, 0x3A)),
+        fault("answers an unknown service of LSS", &["LSS-27"], always_fails_a_check(0x3A, 0x3A)),
         fault(
             "answers a short request of LSS",
             &["LSS-28"],
