@@ -108,6 +108,12 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
     report = nodectl(simulator, "update", a)
     assert report["result"] == "updated"
     assert (report["old_identification"], report["new_identification"]) == (identification(b), identification(a))
+    # The log has both updates, the newest event first.
+    events = ["confirmed by a command", "on trial"] * 2
+    until(lambda: [entry["event"] for entry in nodectl(simulator, "info")["program"]["log"]] == events, "log both updates")
+    program = nodectl(simulator, "info")["program"]
+    assert [entry["version"] for entry in program["log"]] == ["0.1.0", "0.1.0", "0.2.0", "0.2.0"]
+    assert (program["sector_erases"], program["clears_allowed"]) == (6, 48)
     assert simulator.quit()["bus"]["errors"] == 0
 
 

@@ -92,7 +92,7 @@ fn a_program_that_clears_in_a_loop_uses_its_budget_up_and_an_update_after_a_loss
     bench.start();
     bench.run(SECOND);
     assert_eq!(bench.read(CLEARS_ALLOWED), Ok(vec![0]));
-    assert_eq!(erases(&mut bench), Clears::BURST.into());
+    assert_eq!(erases(&mut bench), u16::from(Clears::BURST));
     bench.power_cycle();
     bench.run(SECOND);
     assert_eq!(bench.read(CLEARS_ALLOWED), Ok(vec![Clears::BURST]));
