@@ -60,8 +60,8 @@ fn the_error_bit_and_a_wrong_parity_are_reported_and_end() {
 #[test]
 fn a_bouncing_encoder_stays_within_one_step() {
     let (mut world, master) = start("");
-    stimulate(&mut world, "shaft", "const:0.5");
-    wait(&mut world, 100);
+    stimulate(&mut world, "shaft", "ramp:0,0.5,0.3");
+    wait(&mut world, 500);
     let before = read(&mut world, &master, POSITION);
     stimulate(&mut world, "fault", "bounce:on");
     let mut seen = Vec::new();
