@@ -148,6 +148,16 @@ impl<D: Device> World<D> {
         [0, 1].map(|at| f64::from(self.device.sensor(at).fastest)).into_iter().fold(f64::MAX, f64::min)
     }
 
+    /// The fastest movement of the sensors that are read over SSI.
+    fn fastest_code(&self) -> i64 {
+        let sensors = [0, 1].map(|at| self.device.sensor(at)).into_iter();
+        sensors
+            .filter(|sensor| sensor.kind.is_absolute())
+            .map(|sensor| sensor.fastest.into())
+            .max()
+            .unwrap_or(0)
+    }
+
     /// The positions of the shortest code.
     fn code(&self) -> i64 {
         let sensors = [0, 1].map(|at| self.device.sensor(at)).into_iter();
@@ -214,7 +224,7 @@ impl<D: Device> World<D> {
             1 => self.disturb(Fault::Silent, 600),
             2 if self.case.any(SensorType::is_absolute) => {
                 // Further than the sensor can move, either way: a smaller jump looks like a movement.
-                let least = 2 * self.fastest() as i64;
+                let least = 2 * self.fastest_code();
                 let away = least + self.random.below((self.code() - 2 * least) as u64) as i64;
                 self.disturb(Fault::Jump(away), 300);
             }
@@ -322,15 +332,18 @@ impl<D: Device> World<D> {
     /// incremental one must rest, unless it still turns when the node is back.
     fn movement_at_rest(&mut self, reset: Reset) -> f64 {
         let part = if reset == Reset::NoBattery { 0.24 } else { 0.45 };
+        let part_of_code = part * self.code() as f64;
         if self.case.is_absolute() {
-            return (self.random.signed() * part * self.code() as f64).trunc();
+            return (self.random.signed() * part_of_code).trunc();
         }
         if self.random.one_in(4) {
             // One that creeps is seen when it has left its place by more than a step: some milliseconds later.
             let part = self.random.signed();
             self.speed = part * self.fastest() + 4.0 * part.signum();
             self.target = self.speed;
-            return self.random.signed() * 50_000.0;
+            // A code beside it has the limits of a code.
+            let has_code = self.case.any(SensorType::is_absolute);
+            return self.random.signed() * if has_code { part_of_code } else { 50_000.0 };
         }
         0.0
     }
