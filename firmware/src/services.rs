@@ -10,7 +10,7 @@ use bsp::led::{Indicators, Led};
 use bsp::losses::{EVENTS, Event, Losses};
 use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
-use canopen::indicators::BusHealth;
+use canopen::indicators::{self, BusHealth};
 use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
 use node::{Action, BitRate, BusEvent, Fault, Next, NodeId, Parameters, Protocol, State};
@@ -121,7 +121,8 @@ impl Services {
         }
         self.led.set(blink(now));
         self.indicate(now, node);
-        self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
+        let next_look = (now + PERIOD).min(indicators::Indicators::next_change(now));
+        self.alarm.set(next.services.min(next_look).min(self.back_off.due()));
         // The storage task must report to the watchdog, whether there is something to store or not.
         rtic::pend(STORAGE);
     }

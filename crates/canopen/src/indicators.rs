@@ -64,7 +64,14 @@ pub struct Indicators {
 }
 
 impl Indicators {
-    /// Whether RUN and ERROR are on. To be asked every 20 ms or more often.
+    /// The next instant at which a pattern may change: each change is at a multiple of 50 ms.
+    #[must_use]
+    pub fn next_change(now: Instant) -> Instant {
+        Instant((now.0 / FLICKER + 1) * FLICKER)
+    }
+
+    /// Whether RUN and ERROR are on. To be asked again at [`next_change`](Indicators::next_change) at the latest, and where
+    /// the state of the device changes.
     #[must_use]
     pub fn levels(&self, now: Instant) -> [bool; 2] {
         // Flickering begins with RUN.
@@ -97,6 +104,17 @@ mod tests {
         assert_eq!(phases(Pattern::Flashes(1))[..4], [1000, 200, 1000, 200]);
         assert_eq!(phases(Pattern::Flashes(2))[..4], [200, 200, 1000, 200]);
         assert_eq!(phases(Pattern::Flashes(4))[..8], [200, 200, 200, 200, 200, 200, 1000, 200]);
+    }
+
+    #[test]
+    fn no_pattern_changes_between_two_multiples() {
+        for pattern in [Pattern::Flickering, Pattern::Blinking, Pattern::Flashes(1), Pattern::Flashes(3)] {
+            let changes = (1..100_000)
+                .filter(|ms| pattern.is_on(Instant(ms * 100)) != pattern.is_on(Instant((ms - 1) * 100)));
+            for ms in changes {
+                assert_eq!(Indicators::next_change(Instant(ms * 100 - 1)), Instant(ms * 100), "{pattern:?}");
+            }
+        }
     }
 
     #[test]

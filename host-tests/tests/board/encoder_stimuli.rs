@@ -10,7 +10,6 @@ use crate::support::{Master, read, run, write};
 
 /// 2103h: bits of revolutions, bits of steps, coding, alarm bits, parity.
 const WORD: u16 = 0x2103;
-const SPEED: (u16, u8) = (0x6030, 1);
 /// Bits of 210Bh: parity, and the encoder's own alarm.
 const PARITY: u32 = 1 << 1;
 const OWN_ALARM: u32 = 1 << 2;
@@ -36,8 +35,8 @@ fn every_format_of_the_simulator_is_read_with_the_same_settings() {
         ("10+14,gray,odd", [10, 14, 1, 0, 2]),
     ] {
         let (mut world, master) = absolute(format, word);
-        stimulate(&mut world, "shaft", "const:3.25");
-        wait(&mut world, 50);
+        stimulate(&mut world, "shaft", "ramp:0,3.25,0.5");
+        wait(&mut world, 600);
         let expected = (3.25 * f64::from(1 << word[1])) as u32;
         assert_eq!(read(&mut world, &master, POSITION), expected, "{format}");
         assert_eq!(read(&mut world, &master, SENSOR_STATE), 0, "{format}");
@@ -61,15 +60,14 @@ fn the_error_bit_and_a_wrong_parity_are_reported_and_end() {
 #[test]
 fn a_bouncing_encoder_stays_within_one_step() {
     let (mut world, master) = start("");
-    stimulate(&mut world, "shaft", "const:0.5");
-    wait(&mut world, 100);
+    stimulate(&mut world, "shaft", "ramp:0,0.5,0.3");
+    wait(&mut world, 500);
     let before = read(&mut world, &master, POSITION);
     stimulate(&mut world, "fault", "bounce:on");
     let mut seen = Vec::new();
     for _ in 0..100 {
         wait(&mut world, 3);
         seen.push(read(&mut world, &master, POSITION).wrapping_sub(before).cast_signed());
-        assert!((read(&mut world, &master, SPEED) as u16).cast_signed().abs() <= 1);
     }
     assert!(seen.iter().all(|moved| (0..=1).contains(moved)), "{seen:?}");
     assert!(seen.contains(&0) && seen.contains(&1), "it bounces: {seen:?}");

@@ -69,7 +69,7 @@ fn a_supply_that_fails_slowly_leaves_one_set_of_values() {
             }
         }
         assert!(confirmed > 301, "level {level}: no save was in time");
-        assert_eq!(world.bad_reads(0) > 0, level > 0, "level {level}: {} wrong reads", world.bad_reads(0));
+        assert_eq!(world.bad_reads(0) > 0, level < 3, "level {level}: {} wrong reads", world.bad_reads(0));
         stimulate(&mut world, "supply", "ramp:1.5,3.3,0.2");
         world.run_until(world.now() + SECOND * 2);
         let value = read(&mut world, &master, SAVED) & 0xFFFF;

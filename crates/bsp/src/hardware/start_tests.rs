@@ -137,7 +137,7 @@ enum LoopBack {
     Different = 5,
 }
 
-/// Sends a frame in loop-back. The controller is in initialisation before and afterwards.
+/// Sends a frame in loop-back. The controller is off the bus before and afterwards.
 pub(super) fn note_loop_back(controller: &mut Controller) {
     let mut result = loop_back(controller);
     if !can::is_initialising() {
@@ -151,6 +151,10 @@ fn loop_back(controller: &mut Controller) -> LoopBack {
         return LoopBack::Mode;
     };
     let can = registers();
+    // The timing can be set in initialisation only.
+    if !can::is_initialising() {
+        return LoopBack::Mode;
+    }
     // SAFETY: `BitTiming` asserts that its values fit the register.
     can.btr().write(|w| unsafe { w.bits(timing.btr() | LOOP_BACK) });
     controller.set_filters(&filters::everything());

@@ -1,4 +1,4 @@
-//! The devices that are judged: an encoder with two channels, and two position units of a lift, each on one sensor.
+//! The devices that are judged: an encoder with two channels, and two position units of a lift.
 
 use profiles::board::{
     Inputs, POSITION_RECORD_WORDS, PowerOn, RETAINED_WORDS, RawEncoder, RawSample, Retained,
@@ -27,9 +27,10 @@ pub(crate) struct Shown {
 }
 
 pub(crate) trait Device {
-    fn sensor(&self) -> Sensor;
-    /// The scale of the present settings.
-    fn scale(&self) -> Scale;
+    /// The sensor of a position.
+    fn sensor(&self, at: usize) -> Sensor;
+    /// The scale of a position with the present settings.
+    fn scale(&self, at: usize) -> Scale;
     fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2];
     /// Presets one of the positions, and stores all parameters.
     fn preset(&mut self, at: usize, value: u32, raw: &RawEncoder);
@@ -48,7 +49,9 @@ fn kept(words: [u32; RETAINED_WORDS], reset: Reset) -> (Retained, Option<[u32; P
 
 fn parameters(case: &Case) -> Parameters {
     let mut parameters = Parameters { index: case.index, format: Format::COMMON, ..Parameters::default() };
-    parameters.channels.iter_mut().for_each(|channel| channel.kind = Some(case.kind));
+    for (channel, kind) in parameters.channels.iter_mut().zip(case.kinds()) {
+        channel.kind = Some(kind);
+    }
     if case.is_scaled {
         parameters.operating = SCALING;
         (parameters.per_revolution, parameters.range) = (3600, 36_000);
@@ -135,22 +138,26 @@ impl<E: Chained> EncoderDevice<E> {
 }
 
 impl<E: Chained> Device for EncoderDevice<E> {
-    fn sensor(&self) -> Sensor {
-        self.parameters.sensors().next().unwrap()
+    fn sensor(&self, at: usize) -> Sensor {
+        self.parameters.sensors().nth(at).unwrap()
     }
 
-    fn scale(&self) -> Scale {
-        self.parameters.scale(&self.sensor())
+    fn scale(&self, at: usize) -> Scale {
+        self.parameters.scale(&self.sensor(at))
     }
 
     fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2] {
-        let relative = !self.sensor().kind.is_absolute() && !self.sensor().kind.is_retained();
-        let condemning = SENSOR_POSITION_ERROR | if relative { SENSOR_UNREFERENCED } else { 0 };
         let snapshot = self.encoder.sample(raw);
-        snapshot.channels.map(|values| Shown {
-            position: values.position,
-            is_condemned: values.sensor_state & condemning != 0,
-            awaits_index: self.parameters.index && values.sensor_state & SENSOR_UNREFERENCED != 0,
+        [0, 1].map(|at| {
+            let (values, kind) = (snapshot.channels[at], self.sensor(at).kind);
+            let relative = !kind.is_absolute() && !kind.is_retained();
+            let condemning = SENSOR_POSITION_ERROR | if relative { SENSOR_UNREFERENCED } else { 0 };
+            let is_unreferenced = values.sensor_state & SENSOR_UNREFERENCED != 0;
+            Shown {
+                position: values.position,
+                is_condemned: values.sensor_state & condemning != 0,
+                awaits_index: self.parameters.index && !kind.is_absolute() && is_unreferenced,
+            }
         })
     }
 
@@ -166,7 +173,7 @@ impl<E: Chained> Device for EncoderDevice<E> {
     }
 
     fn turn_round(&mut self) {
-        self.parameters.operating ^= if self.sensor().kind.is_linear() { DIRECTION } else { CODE_SEQUENCE };
+        self.parameters.operating ^= if self.sensor(0).kind.is_linear() { DIRECTION } else { CODE_SEQUENCE };
         self.encoder.apply(&self.parameters);
     }
 
@@ -186,7 +193,7 @@ impl<E: Chained> Device for EncoderDevice<E> {
     }
 }
 
-/// Two position units with their own zero on one sensor.
+/// Two position units with their own zero, on one sensor or on two.
 pub(crate) struct LiftDevice {
     units: PositionUnits,
     parameters: position::Parameters,
@@ -200,8 +207,13 @@ impl LiftDevice {
         let travel = NonZeroU32::new(if case.is_scaled { 314_159 } else { 200_000 }).unwrap();
         let sensors = Parameters { operating: 0, ..parameters(case) };
         let mut parameters = position::Parameters { sensors, travel, ..position::Parameters::default() };
-        parameters.sensors.channels[1].kind = None;
-        parameters.units[..2].iter_mut().for_each(|unit| unit.source = Some(Source::First));
+        let second = if case.kind == case.second { Source::First } else { Source::Second };
+        if second == Source::First {
+            parameters.sensors.channels[1].kind = None;
+        }
+        for (unit, source) in parameters.units.iter_mut().zip([Source::First, second]) {
+            unit.source = Some(source);
+        }
         let units = PositionUnits::default();
         let mut device = LiftDevice { units, parameters, stored: parameters, values: Default::default() };
         device.units.apply(&parameters);
@@ -210,13 +222,14 @@ impl LiftDevice {
 }
 
 impl Device for LiftDevice {
-    fn sensor(&self) -> Sensor {
-        self.parameters.sensors.sensors().next().unwrap()
+    fn sensor(&self, at: usize) -> Sensor {
+        let is_second = self.parameters.units[at].source == Some(Source::Second);
+        self.parameters.sensors.sensors().nth(is_second.into()).unwrap()
     }
 
-    fn scale(&self) -> Scale {
+    fn scale(&self, at: usize) -> Scale {
         let step = NonZeroU32::new(u32::from(self.parameters.position_step.get()) * 10_000).unwrap();
-        Scale::along(&self.sensor().native(), self.parameters.travel, step).unwrap()
+        Scale::along(&self.sensor(at).native(), self.parameters.travel, step).unwrap()
     }
 
     fn sample(&mut self, raw: &RawEncoder) -> [Shown; 2] {

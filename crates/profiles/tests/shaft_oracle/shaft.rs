@@ -9,10 +9,33 @@ use crate::tally::{Reset, Tally};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Case {
     pub(crate) kind: SensorType,
+    /// The sensor type of the second position: the same sensor, or another one.
+    pub(crate) second: SensorType,
     pub(crate) index: bool,
     pub(crate) is_scaled: bool,
     /// An endless axis behind a gear.
     pub(crate) is_geared: bool,
+}
+
+impl Case {
+    /// The sensor types of the two positions.
+    pub(crate) fn kinds(&self) -> [SensorType; 2] {
+        [self.kind, self.second]
+    }
+
+    fn any(&self, has: impl Fn(SensorType) -> bool) -> bool {
+        self.kinds().into_iter().any(has)
+    }
+
+    /// Whether all sensors are read over SSI.
+    fn is_absolute(&self) -> bool {
+        !self.any(|kind| !kind.is_absolute())
+    }
+
+    /// Whether the sensor with an index is linear.
+    fn has_one_mark(&self) -> bool {
+        self.any(|kind| !kind.is_absolute() && kind.is_linear())
+    }
 }
 
 /// Numbers that look random (SplitMix64).
@@ -122,11 +145,24 @@ impl<D: Device> World<D> {
     }
 
     fn fastest(&self) -> f64 {
-        f64::from(self.device.sensor().fastest)
+        [0, 1].map(|at| f64::from(self.device.sensor(at).fastest)).into_iter().fold(f64::MAX, f64::min)
     }
 
+    /// The fastest movement of the sensors that are read over SSI.
+    fn fastest_code(&self) -> i64 {
+        let sensors = [0, 1].map(|at| self.device.sensor(at)).into_iter();
+        sensors
+            .filter(|sensor| sensor.kind.is_absolute())
+            .map(|sensor| sensor.fastest.into())
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// The positions of the shortest code.
     fn code(&self) -> i64 {
-        1 << self.device.sensor().bits()
+        let sensors = [0, 1].map(|at| self.device.sensor(at)).into_iter();
+        let bits = sensors.filter(|sensor| sensor.kind.is_absolute()).map(|sensor| sensor.bits());
+        1 << bits.min().unwrap_or_else(|| self.device.sensor(0).bits())
     }
 
     /// A movement, a few events, and a reset.
@@ -170,7 +206,7 @@ impl<D: Device> World<D> {
         if !self.shown.iter().any(|shown| shown.awaits_index) {
             return;
         }
-        let (from, is_linear) = (self.at, self.case.kind.is_linear());
+        let (from, is_linear) = (self.at, self.case.has_one_mark());
         self.target = if is_linear { -0.9 * from.signum() } else { 0.2 } * self.fastest();
         let has_passed = |at: f64| {
             if is_linear { at.signum() != from.signum() } else { at - from > 2.5 * REVOLUTION as f64 }
@@ -186,9 +222,9 @@ impl<D: Device> World<D> {
         match self.random.below(9) {
             0 => self.disturb(Fault::Silent, 20),
             1 => self.disturb(Fault::Silent, 600),
-            2 if self.case.kind.is_absolute() => {
+            2 if self.case.any(SensorType::is_absolute) => {
                 // Further than the sensor can move, either way: a smaller jump looks like a movement.
-                let least = 2 * self.fastest() as i64;
+                let least = 2 * self.fastest_code();
                 let away = least + self.random.below((self.code() - 2 * least) as u64) as i64;
                 self.disturb(Fault::Jump(away), 300);
             }
@@ -224,8 +260,8 @@ impl<D: Device> World<D> {
     fn turn_round(&mut self) {
         let steps = self.steps();
         self.device.turn_round();
-        let scale = self.device.scale();
-        for (anchor, shown) in self.anchors.iter_mut().zip(&self.shown) {
+        let scales = [0, 1].map(|at| self.device.scale(at));
+        for ((anchor, shown), scale) in self.anchors.iter_mut().zip(&self.shown).zip(scales) {
             let known = anchor.filter(|_| !shown.is_condemned);
             *anchor = known.map(|anchor| Anchor { value: anchor.expected(steps), steps, scale });
         }
@@ -233,7 +269,7 @@ impl<D: Device> World<D> {
 
     fn preset(&mut self, at: usize) {
         self.rest(2);
-        let scale = self.device.scale();
+        let scale = self.device.scale(at);
         let value = self.random.below(scale.range().get()) as u32;
         self.device.preset(at, value, &self.raw);
         self.anchors[at] = Some(Anchor { value, steps: self.steps(), scale });
@@ -248,10 +284,11 @@ impl<D: Device> World<D> {
     /// What a user does with a condemned position: a request first, which is enough where the code is, then a preset.
     fn recover(&mut self) {
         self.rest(2);
-        let code_is_enough = self.code_is_enough();
-        if self.shown.iter().any(|shown| shown.is_condemned) && code_is_enough && self.device.acknowledge() {
+        let is_to_be_believed =
+            |world: &Self, at: usize| world.shown[at].is_condemned && world.code_is_enough(at);
+        if (0..2).any(|at| is_to_be_believed(self, at)) && self.device.acknowledge() {
             self.run(2);
-            if self.shown.iter().any(|shown| shown.is_condemned) {
+            if (0..2).any(|at| is_to_be_believed(self, at)) {
                 self.tally.stuck.push(format!("{:?}: condemned after a request", self.case));
             }
         }
@@ -263,11 +300,11 @@ impl<D: Device> World<D> {
         }
     }
 
-    fn code_is_enough(&self) -> bool {
-        let scale = self.device.scale();
+    fn code_is_enough(&self, at: usize) -> bool {
+        let (scale, sensor) = (self.device.scale(at), self.device.sensor(at));
         let range = u128::from(scale.range().get()) * u128::from(scale.turn().get());
-        let units = (1_u128 << self.device.sensor().bits()) * u128::from(scale.units());
-        self.case.kind.is_absolute() && units.is_multiple_of(range)
+        let units = (1_u128 << sensor.bits()) * u128::from(scale.units());
+        sensor.kind.is_absolute() && units.is_multiple_of(range)
     }
 
     fn restart(&mut self) {
@@ -295,15 +332,18 @@ impl<D: Device> World<D> {
     /// incremental one must rest, unless it still turns when the node is back.
     fn movement_at_rest(&mut self, reset: Reset) -> f64 {
         let part = if reset == Reset::NoBattery { 0.24 } else { 0.45 };
-        if self.case.kind.is_absolute() {
-            return (self.random.signed() * part * self.code() as f64).trunc();
+        let part_of_code = part * self.code() as f64;
+        if self.case.is_absolute() {
+            return (self.random.signed() * part_of_code).trunc();
         }
         if self.random.one_in(4) {
             // One that creeps is seen when it has left its place by more than a step: some milliseconds later.
             let part = self.random.signed();
             self.speed = part * self.fastest() + 4.0 * part.signum();
             self.target = self.speed;
-            return self.random.signed() * 50_000.0;
+            // A code beside it has the limits of a code.
+            let has_code = self.case.any(SensorType::is_absolute);
+            return self.random.signed() * if has_code { part_of_code } else { 50_000.0 };
         }
         0.0
     }
@@ -320,7 +360,8 @@ impl<D: Device> World<D> {
         }
         // A long code is longer than the way of its shaft while the power is off.
         let most = 0.24 * self.code() as f64;
-        let is_long = matches!(self.case.kind, SensorType::MultiTurn | SensorType::LinearAbsolute);
+        let is_long =
+            self.case.any(|kind| matches!(kind, SensorType::MultiTurn | SensorType::LinearAbsolute));
         self.at += if is_long { way.clamp(-most, most) } else { way };
     }
 
@@ -331,15 +372,16 @@ impl<D: Device> World<D> {
         self.anchors = self.stored;
         self.fault = Fault::None;
         self.age = 0;
-        let kind = self.case.kind.code();
-        self.tally.row(kind, reset).resets += 1;
+        let kinds = self.case.kinds().map(SensorType::code);
+        let sensors = if kinds[0] == kinds[1] { &kinds[..1] } else { &kinds };
+        sensors.iter().for_each(|kind| self.tally.row(*kind, reset).resets += 1);
         self.run(5);
         let steps = self.steps();
         for at in 0..2 {
             let Some(anchor) = self.anchors[at] else { continue };
             if self.shown[at].is_condemned {
-                let is_right = self.error(at, anchor.expected(steps)) <= self.tolerance();
-                let row = self.tally.row(kind, reset);
+                let is_right = self.error(at, anchor.expected(steps)) <= self.tolerance(at);
+                let row = self.tally.row(kinds[at], reset);
                 row.condemned += 1;
                 row.condemned_right += u32::from(is_right);
             }
@@ -367,7 +409,7 @@ impl<D: Device> World<D> {
     fn readings(&mut self, last: i64) -> RawEncoder {
         let steps = self.steps();
         let count = |steps: i64| (steps - self.counted_from) as u16;
-        let mark = if self.case.kind.is_linear() { i64::MAX / 4 } else { REVOLUTION };
+        let mark = if self.case.has_one_mark() { i64::MAX / 4 } else { REVOLUTION };
         let has_crossed = last.div_euclid(mark) != steps.div_euclid(mark);
         let zero = last.div_euclid(mark).max(steps.div_euclid(mark)) * mark;
         let jump = if let Fault::Jump(away) = self.fault { away } else { 0 };
@@ -382,7 +424,7 @@ impl<D: Device> World<D> {
     }
 
     fn judge(&mut self) {
-        let (kind, reset, steps) = (self.case.kind.code(), self.reset, self.steps());
+        let (reset, steps) = (self.reset, self.steps());
         if self.age < 2 {
             // The first word has not come yet.
             return;
@@ -390,10 +432,10 @@ impl<D: Device> World<D> {
         for at in 0..2 {
             let Some(anchor) = self.anchors[at] else { continue };
             let expected = anchor.expected(steps);
-            if self.shown[at].is_condemned || self.error(at, expected) <= self.tolerance() {
+            if self.shown[at].is_condemned || self.error(at, expected) <= self.tolerance(at) {
                 continue;
             }
-            self.tally.row(kind, reset).wrong_as_right += 1;
+            self.tally.row(self.case.kinds()[at].code(), reset).wrong_as_right += 1;
             if self.tally.examples.len() < 3 {
                 let shown = self.shown[at];
                 self.tally.examples.push(format!(
@@ -405,15 +447,15 @@ impl<D: Device> World<D> {
     }
 
     fn error(&self, at: usize, expected: u32) -> u64 {
-        let range = self.device.scale().range().get();
+        let range = self.device.scale(at).range().get();
         let difference = u64::from(self.shown[at].position.abs_diff(expected));
         difference.min(range.saturating_sub(difference))
     }
 
     /// The step at a limit of a unit, the tolerance of the index, and the age of a reading that is tolerated.
-    fn tolerance(&self) -> u64 {
+    fn tolerance(&self, at: usize) -> u64 {
         let moved = self.before.iter().map(|before| before.abs_diff(self.steps())).max().unwrap_or(0);
-        let scale = self.device.scale();
+        let scale = self.device.scale(at);
         let units = u128::from(moved + 4) * u128::from(scale.units()) / u128::from(scale.turn().get());
         units as u64 + 2
     }

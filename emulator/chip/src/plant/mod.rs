@@ -28,8 +28,9 @@ pub use table::{Table, TableError};
 
 /// The supply of the chip in volts.
 const SUPPLY: f64 = 3.3;
-/// The time between two bounces of the incremental encoder, longer than the filter of the timer's inputs.
-const BOUNCE: Time = Time::from_micros(20);
+/// The time between two bounces of the incremental encoder: longer than the filter of the timer's inputs, and no part of
+/// the period of the samples.
+const BOUNCE: Time = Time::from_micros(23);
 
 /// The quantities that the sensors measure, the supply, and the faults.
 #[derive(Clone, Debug)]
