@@ -29,3 +29,4 @@ mod program_trial;
 mod storing;
 mod stuck_client;
 mod unsafe_code;
+mod ways;

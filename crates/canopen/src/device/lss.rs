@@ -27,7 +27,7 @@ pub(super) struct LssSlave {
     /// When to send the response again that found the queue full.
     reply_due: Tick,
     switching: Switching,
-    /// When the present delay is over.
+    /// When the present delay is over; `NEVER` while the bit rate does not change.
     switching_due: Tick,
 }
 
@@ -72,7 +72,7 @@ impl LssSlave {
 
     /// Whether a change of the bit rate is under way: nothing is sent during the change.
     pub(super) fn is_switching(&self) -> bool {
-        self.switching != Switching::No
+        self.switching_due != Tick::NEVER
     }
 
     #[inline(never)]

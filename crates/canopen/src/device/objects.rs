@@ -271,5 +271,6 @@ impl<D: Definition> Inner<D> {
 
 /// The string that an upload returns: without the zeros at its end.
 fn text(value: &[u8]) -> &[u8] {
-    value.split(|&byte| byte == 0).next().unwrap_or(value)
+    let len = value.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    value.get(..len).unwrap_or(value)
 }

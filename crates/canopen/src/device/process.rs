@@ -20,7 +20,9 @@ impl<D: Definition> Device<D> {
         let now = self.tick_of_frame(now);
         if self.is_request(frame) {
             self.send_due_process(now, out);
-            self.take_service_frame(frame, now, out);
+            if !self.take_segment(frame, now) {
+                self.take_service_frame(frame, now, out);
+            }
         } else {
             self.take_process_frame(frame, now, out);
             self.take_other_service(frame, now, out);

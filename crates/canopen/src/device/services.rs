@@ -185,15 +185,16 @@ impl<D: Definition> Device<D> {
     /// Takes a segment of a block that only needs a place in the buffer. In any state: without SDO, there is no transfer.
     /// Returns whether the frame was one.
     #[inline]
-    fn take_segment(&mut self, frame: &Frame, now: Tick) -> bool {
+    pub(super) fn take_segment(&mut self, frame: &Frame, now: Tick) -> bool {
         let request = if self.services.sdo.takes_block() { self.request(frame) } else { None };
         request.is_some_and(|request| self.services.sdo.take_segment(request, now))
     }
 
+    /// Takes a frame that [`take_segment`](Device::take_segment) has not taken.
     #[inline(never)]
     pub(super) fn take_service_frame(&mut self, frame: &Frame, now: Tick, out: &mut impl Transmit) {
         let Some(request) = self.request(frame) else { return self.take_other_service(frame, now, out) };
-        if self.inner.state.has_services() && !self.take_segment(frame, now) {
+        if self.inner.state.has_services() {
             let (context, id) = (&mut self.services.context(now, out), self.inner.service(SDO_RESPONSE));
             let due = self.services.sdo.take(request, id, &mut self.inner, context);
             self.inner.serve_until(due);

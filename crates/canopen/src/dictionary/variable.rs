@@ -9,7 +9,7 @@ use super::{Dictionary, Field};
 /// A number of Rust that an entry can have.
 pub trait Number: Copy + sealed::Sealed {
     #[doc(hidden)]
-    const SIZE: u8;
+    const SIZE: usize;
     #[doc(hidden)]
     const IS_SIGNED: bool;
     #[doc(hidden)]
@@ -87,7 +87,7 @@ impl Dictionary {
             Kind::Plain => T::SIZE == 8 || !T::IS_SIGNED && !T::IS_REAL,
             Kind::Text | Kind::Domain => false,
         };
-        if field.size != T::SIZE || !is_same {
+        if field.size as usize != T::SIZE || !is_same {
             fail(index, sub, "the entry has another type");
         }
         Variable { field, kind: PhantomData }
@@ -100,7 +100,7 @@ macro_rules! numbers {
             impl sealed::Sealed for $kind {}
 
             impl Number for $kind {
-                const SIZE: u8 = $kind::MAX.to_le_bytes().len() as u8;
+                const SIZE: usize = $kind::MAX.to_le_bytes().len();
                 const IS_SIGNED: bool = $signed;
                 const IS_REAL: bool = $real;
 

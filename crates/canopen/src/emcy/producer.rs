@@ -41,7 +41,8 @@ impl Queue {
 
     /// Removes the oldest message of a queue that has any.
     fn pop(&mut self) {
-        (self.first, self.len) = ((self.first + 1) % WAITING as u8, self.len.saturating_sub(1));
+        self.first = if usize::from(self.first) + 1 < WAITING { self.first + 1 } else { 0 };
+        self.len = self.len.saturating_sub(1);
     }
 }
 

@@ -128,10 +128,10 @@ impl Layout {
 
     /// Writes the data of the PDO to the image.
     pub(crate) fn scatter(&self, data: [u8; 8], image: &mut [u8]) {
-        let mut data = u64::from_le_bytes(data);
+        let mut rest = data.as_slice();
         for place in self.places() {
-            place.set(image, &data.to_le_bytes());
-            data = data.checked_shr(u32::from(place.size) * 8).unwrap_or(0);
+            place.set(image, rest);
+            rest = rest.get(usize::from(place.size)..).unwrap_or_default();
         }
     }
 }

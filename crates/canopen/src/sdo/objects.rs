@@ -230,14 +230,15 @@ impl Sink {
     #[inline]
     pub(super) fn append_direct(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
         let start = usize::from(self.held);
-        if start + data.len() > self.direct.into() {
+        let end = start + data.len();
+        if end > self.direct.into() {
             return false;
         }
-        let Some(place) = buffer.get_mut(start..).and_then(|rest| rest.first_chunk_mut()) else {
+        let Some(place) = buffer.get_mut(start..end).and_then(|place| place.first_chunk_mut()) else {
             return false;
         };
         *place = *data;
-        self.held = in_buffer(start + data.len());
+        self.held = in_buffer(end);
         true
     }
 

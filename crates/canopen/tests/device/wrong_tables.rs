@@ -9,6 +9,12 @@ const INPUT: Object =
 const OUTPUT: Object =
     Object::new(0x6200, 0, "Output", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo);
 
+/// A row with a change that its methods do not offer.
+fn changed(mut row: Object, change: impl FnOnce(&mut Object)) -> Object {
+    change(&mut row);
+    row
+}
+
 /// The compile error of a table of these rows; `None` for a table that compiles.
 fn compile_error(parts: &[&[Object]]) -> Option<String> {
     let mut rows = parts.concat();
@@ -32,7 +38,7 @@ fn a_pdo_maps_only_objects_of_the_table() {
 
 #[test]
 fn a_mapped_object_has_the_length_of_its_row() {
-    let wide = Object { kind: Type::Unsigned16, ..INPUT };
+    let wide = changed(INPUT, |row| row.kind = Type::Unsigned16);
     assert_error(&[&objects::tpdo(2, &[INPUT]), &[wide]], "1A01h:1: the mapped object has another length");
     let dummy = [objects::pdo::slot(0x1600, 1, 0x0005_0010)];
     let mut rows = objects::rpdo(1, &[OUTPUT]);
@@ -100,7 +106,7 @@ fn a_pdo_has_all_its_rows() {
 
 #[test]
 fn mapped_objects_are_not_longer_than_a_pdo() {
-    let long = Object { index: 0x6001, kind: Type::Unsigned64, ..INPUT };
+    let long = changed(INPUT, |row| (row.index, row.kind) = (0x6001, Type::Unsigned64));
     let mut rows = objects::tpdo(1, &[INPUT]);
     rows[6] = rows[6].value(2);
     rows[8] = rows[8].value(0x6001_0040);
@@ -117,7 +123,7 @@ fn an_entry_of_cia_301_keeps_its_service() {
         "1019h:0: the entry would lose its service: no handled(), setting() and the like for this index";
     assert_error(&[&[setting]], message);
     // A rule cannot move to another index either.
-    let moved = Object { index: 0x2000, ..objects::heartbeat_producer(0) };
+    let moved = changed(objects::heartbeat_producer(0), |row| row.index = 0x2000);
     let message =
         "2000h:0: the entry would lose its service: no handled(), setting() and the like for this index";
     assert_error(&[&[moved]], message);
@@ -198,7 +204,7 @@ fn the_attributes_of_a_row_fit_together() {
     for (row, message) in cases {
         assert_error(&[&[row]], &format!("2000h:0: {message}"));
     }
-    let last = Object { sub: 255, ..row(Type::Unsigned8, Access::ReadWrite) };
+    let last = changed(row(Type::Unsigned8, Access::ReadWrite), |row| row.sub = 255);
     let message = "2000h:255: an object has at most 255 entries, 0 to 254";
     assert_error(&[&[row(Type::Unsigned8, Access::ReadWrite), last]], message);
 }

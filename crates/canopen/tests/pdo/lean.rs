@@ -10,8 +10,11 @@ const INPUT: Object =
     Object::new(0x6000, 0, "Input", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
 
 /// A TPDO that does not answer remote frames, and an RPDO with the CAN-ID 202h.
-const SILENT_ROWS: &[Object] =
-    canopen::rows!(objects::without_remote(objects::tpdo(1, &[INPUT])), objects::rpdo(1, &[OUTPUT]), [INPUT, OUTPUT]);
+const SILENT_ROWS: &[Object] = canopen::rows!(
+    objects::without_remote(objects::tpdo(1, &[INPUT])),
+    objects::rpdo(1, &[OUTPUT]),
+    [INPUT, OUTPUT]
+);
 static SILENT: Dictionary = canopen::dictionary!(SILENT_ROWS);
 const OUTPUT: Object =
     Object::new(0x6100, 0, "Output", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo);
@@ -76,7 +79,10 @@ fn without_remote_frames_none_is_answered_and_no_client_can_allow_them() {
     assert_eq!(Services::of(SILENT_ROWS), Services::FAULTS);
     let asked = objects::with(objects::without_remote(objects::tpdo(1, &[INPUT])), 2, 253);
     assert!(Services::of(&asked).contains(Services::REMOTE), "type 253 needs them");
-    assert!(Services::of(&objects::tpdo(5, &[INPUT])).contains(Services::REMOTE), "also while it is not valid");
+    assert!(
+        Services::of(&objects::tpdo(5, &[INPUT])).contains(Services::REMOTE),
+        "also while it is not valid"
+    );
 
     type Node = canopen::device!(Nothing, SILENT_ROWS);
     let (mut device, mut sent): (Node, _) = (Device::new(&SILENT, NodeId::new(ID), Nothing), Sent::default());
