@@ -10,6 +10,7 @@ mod lss;
 mod manual;
 mod map;
 mod monitor;
+mod net;
 mod nmt;
 mod node_set;
 mod options;
@@ -23,6 +24,7 @@ mod scan;
 mod serve;
 mod session;
 mod sheets;
+mod simulate;
 mod store;
 mod trace;
 mod traffic;
@@ -67,6 +69,8 @@ enum Command {
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),
+    Net(net::Net),
+    Simulate(simulate::Simulate),
     Rules(rules::Rules),
     Save(store::Save),
     Restore(store::Restore),
@@ -107,6 +111,7 @@ impl Cli {
             Command::Trace(trace) => trace.needs_a_bus(),
             Command::Rules(rules) => rules.needs_a_bus(),
             Command::Check(check) => check.needs_a_bus(),
+            Command::Net(net) => net.needs_a_bus(),
             Command::Explain(_) | Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
@@ -131,6 +136,8 @@ impl Cli {
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
             Command::Trace(trace) => trace.run(session),
+            Command::Net(net) => net.run(session),
+            Command::Simulate(simulate) => simulate.run(session),
             Command::Rules(rules) => rules.run(session),
             Command::Save(save) => save.run(session),
             Command::Restore(restore) => restore.run(session),
