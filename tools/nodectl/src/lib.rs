@@ -41,9 +41,9 @@ pub mod simulate;
 pub mod text;
 pub mod tpdo;
 pub mod trace;
-pub mod unit;
 pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
 pub use network::{Gate, Heard, Logged, Network};
+pub use wire::unit;

@@ -1,6 +1,9 @@
 //! The command line: one file for each command.
 
+mod bus;
+mod by_id;
 mod check;
+mod dbc;
 mod dump;
 mod explain;
 mod failure;
@@ -19,6 +22,7 @@ mod paper;
 mod read;
 mod record;
 mod replacement;
+mod replay;
 mod rules;
 mod scan;
 mod serve;
@@ -69,6 +73,8 @@ enum Command {
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),
+    Replay(replay::Replay),
+    Bus(bus::Bus),
     Net(net::Net),
     Simulate(simulate::Simulate),
     Rules(rules::Rules),
@@ -112,7 +118,7 @@ impl Cli {
             Command::Rules(rules) => rules.needs_a_bus(),
             Command::Check(check) => check.needs_a_bus(),
             Command::Net(net) => net.needs_a_bus(),
-            Command::Explain(_) | Command::Completions(_) | Command::Man(_) => false,
+            Command::Bus(_) | Command::Explain(_) | Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
     }
@@ -136,6 +142,8 @@ impl Cli {
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
             Command::Trace(trace) => trace.run(session),
+            Command::Replay(replay) => replay.run(session),
+            Command::Bus(bus) => bus.run(session),
             Command::Net(net) => net.run(session),
             Command::Simulate(simulate) => simulate.run(session),
             Command::Rules(rules) => rules.run(session),

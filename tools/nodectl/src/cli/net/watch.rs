@@ -44,8 +44,8 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
             hear(session, plan, planned, heartbeat.state, watched.entry(planned.node).or_default())?;
         }
         let now = session.network.now();
-        for (planned, watched) in plan.nodes.iter().map(|planned| (planned, watched.get_mut(&planned.node))) {
-            miss(session, planned, watched, now)?;
+        for planned in &plan.nodes {
+            miss(session, planned, watched.get_mut(&planned.node), now)?;
         }
     }
     Ok(())
