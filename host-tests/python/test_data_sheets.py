@@ -26,7 +26,7 @@ def oddity(path: Path) -> str:
 def by_nodectl(path: Path) -> str:
     line = [os.environ["NODECTL_COMMAND"], "diff", path, path]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
-    warnings = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+    warnings = {line for line in done.stderr.splitlines() if line.startswith("warning: ")}
     assert done.returncode in (0, 7), done.stderr
     if done.returncode:
         return "no"

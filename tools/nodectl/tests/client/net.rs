@@ -136,7 +136,7 @@ fn each_way_to_be_wrong_is_found() {
         (3, &["product", "sheet"]),
         (4, &["revision"]),
         (5, &["serial"]),
-        (6, &["device-type", "product", "sheet", "serial", "heartbeat"]),
+        (6, &["device-type", "product", "sheet", "serial", "state"]),
         (7, &["hardware", "software"]),
         (8, &["date"]),
         (9, &["value"]),
@@ -159,7 +159,7 @@ fn a_node_that_is_another_or_refuses_a_value_is_reported_and_nothing_is_started(
     let refused = file("refused.yaml", 3, |node| if node == 2 { ", 6060: 300" } else { "" }, |_| "");
     let (code, text) = failed(&wire, &["net", "apply", refused.to_str().unwrap()]);
     assert_eq!((code, text.contains("\"300\" is not a whole number")), (7, true), "{text}");
-    let refused = file("refused.yaml", 3, |node| if node == 3 { ", '1800:1': 0x80000001" } else { "" }, |_| "");
+    let refused = file("refused.yaml", 3, |node| if node == 3 { ", '1800:2': 245" } else { "" }, |_| "");
     wire.station(|nodes| nodes[0] = device("plain-pump.eds", 1));
     let (lines, result) = run(&wire, &["net", "apply", refused.to_str().unwrap()]);
     assert_eq!(result.unwrap_err().exit_code(), 11);

@@ -1,9 +1,10 @@
 //! `nodectl net check`: the bus and its file, compared.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 
 use canopen::nmt::State;
+use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
 use serde::Serialize;
 
@@ -109,7 +110,8 @@ fn compare(
     }
     let wanted = planned.wanted(&catalogue)?;
     let present = values(session, planned.node, &catalogue, &wanted)?;
-    for difference in wanted.differences(&present) {
+    let is_wanted = |at: Multiplexer| wanted.values.contains_key(&(at.index, at.sub));
+    for difference in wanted.differences(&present).into_iter().filter(|one| is_wanted(one.at)) {
         let text = |value: &Option<Value>| {
             value.as_ref().map_or("not there".to_owned(), |value| visible(&value.to_string()))
         };
@@ -121,7 +123,8 @@ fn compare(
     Ok(())
 }
 
-/// The values that a node has of the wanted parameters. One that the node refuses is missing.
+/// The values that a node has of the wanted parameters, and the COB-IDs and sizes of the PDOs to which they belong. A value
+/// that the node refuses is missing.
 pub(super) fn values(
     session: &mut Session,
     node: NodeId,
@@ -129,7 +132,10 @@ pub(super) fn values(
     wanted: &Configuration,
 ) -> Result<Configuration, Failure> {
     let mut present = Configuration::default();
-    for (index, sub) in wanted.values.keys() {
+    let pdos = wanted.values.keys().filter(|key| (0x1400..=0x1BFF).contains(&key.0));
+    let of_pdos = pdos.flat_map(|key| [(key.0 & !0x0200, 1), (key.0 | 0x0200, 0)]);
+    let keys: BTreeSet<(u16, u8)> = wanted.values.keys().copied().chain(of_pdos).collect();
+    for (index, sub) in &keys {
         let Some(entry) = catalogue.sheet().get(*index, *sub) else { continue };
         if let Some(bytes) = session.optional(node, at(*index, *sub))? {
             present.values.insert((*index, *sub), Value::decode(&bytes, entry.data_type));
