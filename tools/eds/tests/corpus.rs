@@ -46,7 +46,10 @@ fn what_is_read_can_be_written_and_read_again() {
         let again = Eds::parse(&sheet.to_dcf(&name, Reals::Decimal)).expect("a sheet");
         assert_eq!(again.objects.len(), sheet.objects.len(), "{name}");
         for (first, second) in sheet.entries().zip(again.entries()) {
-            assert_eq!((first.index, first.sub, first.data_type), (second.index, second.sub, second.data_type));
+            assert_eq!(
+                (first.index, first.sub, first.data_type),
+                (second.index, second.sub, second.data_type)
+            );
             assert_eq!(first.default, second.default, "{name}: {:04X}h:{}", first.index, first.sub);
         }
     }

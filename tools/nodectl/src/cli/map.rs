@@ -52,8 +52,12 @@ pub(super) struct Map {
 }
 
 fn can_id(text: &str) -> Result<u16, String> {
-    let number = text.strip_prefix("0x").map_or_else(|| text.parse(), |digits| u16::from_str_radix(digits, 16));
-    number.ok().filter(|id| (1..0x800).contains(id)).ok_or_else(|| format!("\"{text}\" is no CAN-ID, as 0x181"))
+    let number =
+        text.strip_prefix("0x").map_or_else(|| text.parse(), |digits| u16::from_str_radix(digits, 16));
+    number
+        .ok()
+        .filter(|id| (1..0x800).contains(id))
+        .ok_or_else(|| format!("\"{text}\" is no CAN-ID, as 0x181"))
 }
 
 /// Switches a PDO off and empties its mapping.
@@ -238,18 +242,14 @@ impl Map {
     /// The times to write, by sub-index of the communication parameter.
     fn times(&self) -> Vec<(u8, Vec<u8>)> {
         let word = |sub, time: Option<u16>| time.map(|time| (sub, time.to_le_bytes().to_vec()));
-        let times = [word(3, self.inhibit), word(5, self.event_timer), self.sync_start.map(|at| (6, vec![at]))];
+        let times =
+            [word(3, self.inhibit), word(5, self.event_timer), self.sync_start.map(|at| (6, vec![at]))];
         times.into_iter().flatten().collect()
     }
 }
 
 /// The mapping entry of an object: index, sub-index, bits.
-fn entry(
-    session: &mut Session,
-    direction: Direction,
-    node: NodeId,
-    query: &str,
-) -> Result<u32, Failure> {
+fn entry(session: &mut Session, direction: Direction, node: NodeId, query: &str) -> Result<u32, Failure> {
     let object = session.find(node, query)?;
     let catalogue = session.catalogue(node)?;
     let slot = slot(&catalogue, direction, object);

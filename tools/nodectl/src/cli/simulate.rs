@@ -94,7 +94,8 @@ impl Simulate {
 
     fn serve(&self, session: &mut Session, device: &mut Node) -> Result<(), Failure> {
         let network = &mut session.network;
-        let end = self.duration.map(|seconds| network.now() + Duration::from_millis(u64::from(seconds) * 1000));
+        let end =
+            self.duration.map(|seconds| network.now() + Duration::from_millis(u64::from(seconds) * 1000));
         let mut queue = Queue::default();
         let mut state: Option<(Option<NodeId>, canopen::nmt::State)> = None;
         loop {
@@ -108,7 +109,8 @@ impl Simulate {
             }
             let present = (device.node_id(), device.state());
             if state.replace(present) != Some(present) {
-                let node = present.0.map_or("without a node-ID".to_owned(), |node| format!("node {}", node.get()));
+                let node =
+                    present.0.map_or("without a node-ID".to_owned(), |node| format!("node {}", node.get()));
                 note(format_args!("{node}: {}", crate::heartbeat::words(present.1)));
             }
             if let Some(received) = network.receive(due.min(now + WAKE))? {

@@ -184,7 +184,9 @@ mod tests {
     #[test]
     fn the_schema_has_every_key() {
         let text = schema().to_string();
-        for key in ["\"start\"", "\"nodes\"", "\"consumes\"", "\"guarding\"", "\"device_type\"", "\"optional\""] {
+        for key in
+            ["\"start\"", "\"nodes\"", "\"consumes\"", "\"guarding\"", "\"device_type\"", "\"optional\""]
+        {
             assert!(text.contains(key), "{key}");
         }
     }

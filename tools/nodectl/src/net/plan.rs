@@ -141,12 +141,7 @@ impl PlannedNode {
         Ok(wanted)
     }
 
-    fn value(
-        &self,
-        catalogue: &Catalogue,
-        name: &str,
-        text: &str,
-    ) -> Result<((u16, u8), Value), PlanError> {
+    fn value(&self, catalogue: &Catalogue, name: &str, text: &str) -> Result<((u16, u8), Value), PlanError> {
         let wrong = |reason: String| PlanError::Value { node: self.node.get(), reason };
         let object = catalogue.find(name).map_err(|error| wrong(error.to_string()))?;
         let entry = catalogue.sheet().get(object.index, object.sub);
@@ -156,8 +151,9 @@ impl PlannedNode {
             .ok_or_else(|| wrong(format!("{} is no object that the data sheet lets write", Place(object))))?;
         let value = match catalogue.word(object, text) {
             Some(value) => value,
-            None => Value::parse(text, data_type)
-                .map_err(|error| wrong(format!("{}: {error}", Place(object))))?,
+            None => {
+                Value::parse(text, data_type).map_err(|error| wrong(format!("{}: {error}", Place(object))))?
+            }
         };
         Ok(((object.index, object.sub), value))
     }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use canopen::dictionary::{Dictionary, Entry, Group, Services, Sizes};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{
-    Action, Application, Condition, Device, Frame, Instant, Job, Next, NodeId, Part, Soundness, Stored, Transmit,
+    Action, Application, Condition, Device, Frame, Instant, Job, Next, NodeId, Part, Soundness, Stored,
+    Transmit,
 };
 
 use super::rows::Table;
@@ -208,7 +209,9 @@ impl Node {
         while let Some(deed) = self.script.due(now, begin) {
             match deed {
                 Deed::Value(at, bytes) => {
-                    let _ = self.device.publish(now, out, |app, image| app.set((at.index, at.sub), &bytes, image));
+                    let _ = self
+                        .device
+                        .publish(now, out, |app, image| app.set((at.index, at.sub), &bytes, image));
                     self.send_by_timer(at, now, out);
                 }
                 Deed::Fault(condition) => {
@@ -231,7 +234,14 @@ impl Node {
             let (dictionary, image) = (self.device.application().dictionary, self.device.image());
             let number = |index, sub| {
                 let entry = dictionary.find(index, sub).ok()?;
-                Some(entry.field().get(image).iter().rev().fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte)))
+                Some(
+                    entry
+                        .field()
+                        .get(image)
+                        .iter()
+                        .rev()
+                        .fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte)),
+                )
             };
             let carries = |slot: u8| number(pdo | 0x200, slot).is_some_and(|value| value >> 8 == key(at));
             let count = number(pdo | 0x200, 0).unwrap_or(0);

@@ -70,7 +70,9 @@ fn repair_one(all: &mut Rows, pdo: u16) {
     let wrong = match base.and_then(CobId::parse) {
         None => Some("the PDO is off: its CAN-ID has more than 11 bits"),
         Some(id) if id.bit31 => None,
-        Some(_) if is_reserved(all, pdo) => Some("the PDO is off: its CAN-ID is reserved for another service"),
+        Some(_) if is_reserved(all, pdo) => {
+            Some("the PDO is off: its CAN-ID is reserved for another service")
+        }
         Some(_) => mapped.err(),
     };
     if mapped.is_err() || wrong.is_some() {
@@ -98,7 +100,8 @@ fn clear(all: &mut Rows, pdo: u16, is_mapping_wrong: bool) {
     };
     set_default(all, (pdo, 1), off);
     if is_mapping_wrong {
-        let keys: Vec<_> = all.rows.range((pdo | 0x200, 0)..=(pdo | 0x200, 254)).map(|(key, _)| *key).collect();
+        let keys: Vec<_> =
+            all.rows.range((pdo | 0x200, 0)..=(pdo | 0x200, 254)).map(|(key, _)| *key).collect();
         keys.into_iter().for_each(|key| set(all, key, 0));
     }
 }

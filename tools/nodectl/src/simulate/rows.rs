@@ -274,7 +274,8 @@ fn is_within(default: DefaultValue, (low, high): (i64, i64)) -> bool {
 
 fn mapping(entry: &Entry, row: &Object) -> Mapping {
     let fits = (1..=8).contains(&row.kind.size());
-    let is_sent = fits && entry.is_tpdo_mappable() && !matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
+    let is_sent =
+        fits && entry.is_tpdo_mappable() && !matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
     let is_received = fits && entry.is_rpdo_mappable() && matches!(row.rule, Rule::Plain);
     match (is_sent, is_received) {
         (true, true) => Mapping::Both,

@@ -153,17 +153,17 @@ mod tests {
     #[test]
     fn lines_come_at_their_times_and_again() {
         let text = "# a step\n0.2 1017 = 7\n0 Producer heartbeat time = 5 # ms\n1 repeat\n";
-        let value = |value: u16| {
-            Deed::Value(crate::object::at(0x1017, 0), value.to_le_bytes().to_vec())
-        };
+        let value = |value: u16| Deed::Value(crate::object::at(0x1017, 0), value.to_le_bytes().to_vec());
         let expected = [(0, value(5)), (200_000, value(7)), (1_000_000, value(5)), (1_200_000, value(7))];
         assert_eq!(times(&mut script(text).unwrap(), 2_000_000), expected);
     }
 
     #[test]
     fn faults_are_the_classes_of_cia_301() {
-        let deeds: Vec<Deed> =
-            times(&mut script("0 emcy 4200\n1 emcy 0").unwrap(), 2_000_000).into_iter().map(|one| one.1).collect();
+        let deeds: Vec<Deed> = times(&mut script("0 emcy 4200\n1 emcy 0").unwrap(), 2_000_000)
+            .into_iter()
+            .map(|one| one.1)
+            .collect();
         assert_eq!(deeds, [Deed::Fault(condition(0x4200).unwrap()), Deed::NoFault]);
     }
 

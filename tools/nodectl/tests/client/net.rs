@@ -177,7 +177,11 @@ fn a_date_spares_the_comparison_and_is_written_last() {
     text += "\n[1020]\nParameterName=Verify configuration\nObjectType=0x8\nSubNumber=3\n";
     for (sub, data_type) in [(0, 5), (1, 7), (2, 7)] {
         let access = if sub == 0 { "const\nDefaultValue=2" } else { "rw" };
-        write!(text, "\n[1020sub{sub}]\nParameterName=Sub {sub}\nDataType={data_type}\nAccessType={access}\n").unwrap();
+        write!(
+            text,
+            "\n[1020sub{sub}]\nParameterName=Sub {sub}\nDataType={data_type}\nAccessType={access}\n"
+        )
+        .unwrap();
     }
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let (sheet, file) = (folder.join("dated.eds"), folder.join("dated.yaml"));
@@ -194,7 +198,10 @@ fn a_date_spares_the_comparison_and_is_written_last() {
     assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: 3 writes, read back, saved\n");
     assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: has the configuration of this date\n");
     assert_eq!(printed(&wire, &["net", "check", file]), "1 nodes are as the file says\n");
-    assert_eq!(printed(&wire, &["read", "1020:1", "-n", "5"]).split(" = ").nth(1), Some("15668 (00003D34h)\n"));
+    assert_eq!(
+        printed(&wire, &["read", "1020:1", "-n", "5"]).split(" = ").nth(1),
+        Some("15668 (00003D34h)\n")
+    );
 }
 
 #[test]

@@ -57,7 +57,8 @@ fn every_data_sheet_of_the_corpus_makes_a_device_that_answers_as_it_says() {
         let mut node = client(&mut network, 5);
         for entry in sheet.entries().filter(|entry| entry.access.is_readable() && entry.index < 0x1003) {
             let wanted = entry.default.as_ref().map(|value| value.evaluate(NodeId::new(5).unwrap()));
-            let bytes = node.upload(at(entry.index, entry.sub)).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let bytes =
+                node.upload(at(entry.index, entry.sub)).unwrap_or_else(|error| panic!("{name}: {error}"));
             let is = nodectl::value::Value::decode(&bytes, entry.data_type);
             if let (Some(eds::Value::Integer(wanted)), nodectl::value::Value::Integer(is)) = (wanted, is) {
                 assert_eq!(is, wanted, "{name}: {:04X}h:{}", entry.index, entry.sub);

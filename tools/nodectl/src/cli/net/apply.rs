@@ -11,8 +11,8 @@ use super::super::store::{Group, Order, sign};
 use super::check::{date, is_there, of_bus, of_identity, of_states, values};
 use super::finding::{Finding, What, end, print};
 use super::{Applied, Failure, LISTEN, Session, catalogue, watch};
-use crate::nmt::send;
 use crate::net::{Date, Plan, PlannedNode, Start};
+use crate::nmt::send;
 use crate::object::at;
 use crate::scan::scan;
 

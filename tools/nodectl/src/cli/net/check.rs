@@ -76,7 +76,11 @@ pub(super) fn of_bus(plan: &Plan, found: &Found) -> Vec<Finding> {
     });
     let shared = plan.shared_can_ids().into_iter().map(|(id, nodes)| {
         let nodes: Vec<String> = nodes.iter().map(|node| node.get().to_string()).collect();
-        Finding { node: None, what: What::CanId, text: format!("nodes {} send with {id:03X}h", nodes.join(", ")) }
+        Finding {
+            node: None,
+            what: What::CanId,
+            text: format!("nodes {} send with {id:03X}h", nodes.join(", ")),
+        }
     });
     missing.chain(unexpected).chain(shared).collect()
 }
@@ -95,11 +99,7 @@ fn of_node(session: &mut Session, planned: &PlannedNode) -> Result<Vec<Finding>,
     Ok(findings)
 }
 
-fn compare(
-    session: &mut Session,
-    planned: &PlannedNode,
-    findings: &mut Vec<Finding>,
-) -> Result<(), Failure> {
+fn compare(session: &mut Session, planned: &PlannedNode, findings: &mut Vec<Finding>) -> Result<(), Failure> {
     findings.extend(of_identity(session, planned)?);
     if findings.iter().any(|finding| finding.what == What::Sheet) {
         return Ok(());
