@@ -85,8 +85,10 @@ impl Nmt {
 /// Restarts a node. One that LSS has given a new node-ID boots with it, and answers no more at its old one.
 fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
     let silence = || Failure::Silence(format!("node {}: no boot-up message", node.get()));
+    // Another node may boot at the same time, while there is no node of this node-ID at all.
+    let was_there = session.network.heard(node).is_some() || is_there(session, node)?;
     let booted = master::restart(&mut session.network, command, node, BOOT)?.ok_or_else(silence)?;
-    if booted != node && is_there(session, node)? {
+    if booted != node && (!was_there || is_there(session, node)?) {
         return Err(silence());
     }
     session.print(&Booted { node: node.get(), state: "booted", booted: booted.get() })
