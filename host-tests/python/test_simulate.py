@@ -21,16 +21,16 @@ SCRIPT = """
 """
 
 
-@pytest.fixture
-def bench(tmp_path):
+@pytest.fixture(params=[[]])
+def bench(tmp_path, request):
     simulator = Simulator(speed="real")
     bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
     (tmp_path / "values.txt").write_text(SCRIPT)
     nodectl = os.environ["NODECTL_COMMAND"]
-    line = [nodectl, "--json", "--bus", bus, "--eds", SHEET, "-n", str(NODE), "simulate", "--values", tmp_path / "values.txt"]
+    line = [nodectl, "--json", "--bus", bus, "--eds", SHEET, "-n", str(NODE), "simulate", *request.param]
     network = canopen.Network()
     network.connect(interface="socketcand", host="127.0.0.1", port=simulator.socketcand, channel="vcan0")
-    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    process = subprocess.Popen(line, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     assert json.loads(process.stdout.readline())["node"] == NODE
     node = network.add_node(NODE, str(SHEET))
     node.sdo.RESPONSE_TIMEOUT = PATIENCE
@@ -40,6 +40,7 @@ def bench(tmp_path):
     network.disconnect()
 
 
+@pytest.mark.parametrize("bench", [["--values", "values.txt"]], indirect=True)
 def test_python_canopen_drives_it(bench):
     network, node, _bus = bench
     node.nmt.wait_for_heartbeat(PATIENCE)
