@@ -109,7 +109,7 @@ fn unique(name: &str, names: &mut BTreeSet<String>) -> String {
         1 => name.to_owned(),
         number => format!("{}_{number}", name.chars().take(LONGEST - 4).collect::<String>()),
     };
-    let free = (1..).map(with).find(|name| !names.contains(name)).unwrap_or_default();
+    let free = (1..=usize::from(u8::MAX)).map(with).find(|name| !names.contains(name)).unwrap_or_default();
     names.insert(free.clone());
     free
 }

@@ -244,7 +244,7 @@ fn listen(
             let needs = planned.member.heartbeat.is_some_and(|time| time > 0);
             !needs || heard.get(&planned.node) == Some(&State::Operational)
         };
-        nodes.iter().all(|planned| is_up(planned)).then_some(())
+        nodes.iter().all(is_up).then_some(())
     })?;
     Ok(heard)
 }
