@@ -73,7 +73,27 @@ pub struct Heard {
     /// The data of the last TPDO 1.
     #[serde(skip)]
     pub tpdo1: Option<Vec<u8>>,
+    /// The unit of the first channel.
+    #[serde(skip)]
+    pub unit: Unit,
 }
+
+/// The unit of the process value of the first channel (6131h:1), as far as the bus has shown it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unit {
+    /// Nothing has changed it.
+    #[default]
+    Delivered,
+    /// The code that was read or written.
+    Code(u32),
+    /// It was changed, and the node has booted since: the node may have saved it or not.
+    Unknown,
+}
+
+/// The SDO frames of 6131h:1: a download of four bytes, and the response to an upload.
+const WRITES_UNIT: [u8; 4] = [0x23, 0x31, 0x61, 1];
+const UNIT_IS_WRITTEN: [u8; 4] = [0x60, 0x31, 0x61, 1];
+const UNIT_IS_READ: [u8; 4] = [0x43, 0x31, 0x61, 1];
 
 impl Heard {
     fn on_heartbeat(&mut self, data: &[u8]) {
@@ -82,6 +102,9 @@ impl Heard {
         self.state = NmtState::from_code(code & 0x7F);
         if code == 0 {
             self.boot_ups += 1;
+            if self.unit != Unit::Delivered {
+                self.unit = Unit::Unknown;
+            }
         } else {
             self.heartbeats += 1;
         }
@@ -109,6 +132,8 @@ impl Heard {
 #[derive(Clone, Debug, Default)]
 pub struct Traffic {
     nodes: BTreeMap<u8, Heard>,
+    /// Units in downloads that are not acknowledged yet.
+    units: BTreeMap<u8, u32>,
 }
 
 impl Traffic {
@@ -122,12 +147,28 @@ impl Traffic {
         match function {
             0x080 => self.sender(node).on_emcy(frame.bytes()),
             0x180 | 0x280 | 0x380 | 0x480 => self.sender(node).on_tpdo(function >> 8, frame.bytes()),
-            0x580 => self.sender(node).sdo_frames += 1,
-            0x600 => self.nodes.entry(node).or_default().sdo_frames += 1,
+            0x580 => self.on_response(node, frame.bytes()),
+            0x600 => self.on_request(node, frame.bytes()),
             0x700 => self.sender(node).on_heartbeat(frame.bytes()),
             _ => {}
         }
         (function == 0x700 && frame.bytes() == [0]).then_some(node)
+    }
+
+    fn on_request(&mut self, node: u8, data: &[u8]) {
+        self.nodes.entry(node).or_default().sdo_frames += 1;
+        if let Some(code) = code(data, WRITES_UNIT) {
+            self.units.insert(node, code);
+        }
+    }
+
+    fn on_response(&mut self, node: u8, data: &[u8]) {
+        let written = code(data, UNIT_IS_WRITTEN).and_then(|_| self.units.remove(&node));
+        let heard = self.sender(node);
+        heard.sdo_frames += 1;
+        if let Some(code) = written.or(code(data, UNIT_IS_READ)) {
+            heard.unit = Unit::Code(code);
+        }
     }
 
     fn sender(&mut self, node: u8) -> &mut Heard {
@@ -140,6 +181,12 @@ impl Traffic {
     pub fn node(&self, node: u8) -> Heard {
         self.nodes.get(&node).cloned().unwrap_or_default()
     }
+}
+
+/// The last four bytes of an SDO frame that begins with `head`.
+fn code(data: &[u8], head: [u8; 4]) -> Option<u32> {
+    let (begin, rest) = data.split_first_chunk()?;
+    (*begin == head).then_some(u32::from_le_bytes(*rest.first_chunk()?))
 }
 
 #[cfg(test)]
@@ -179,5 +226,18 @@ mod tests {
             assert_eq!(hear(&mut traffic, id, bytes), None);
         }
         assert_eq!(traffic.node(5), Heard { sent: 2, ..Heard::default() });
+    }
+
+    #[test]
+    fn the_unit_is_the_one_that_the_node_has_acknowledged() {
+        let mut traffic = Traffic::default();
+        hear(&mut traffic, 0x605, &[0x23, 0x31, 0x61, 1, 0, 0, 0x22, 3]);
+        assert_eq!(traffic.node(5).unit, Unit::Delivered);
+        hear(&mut traffic, 0x585, &[0x60, 0x31, 0x61, 1, 0, 0, 0, 0]);
+        assert_eq!(traffic.node(5).unit, Unit::Code(0x0322_0000));
+        hear(&mut traffic, 0x705, &[0]);
+        assert_eq!(traffic.node(5).unit, Unit::Unknown);
+        hear(&mut traffic, 0x585, &[0x43, 0x31, 0x61, 1, 0, 0, 0x4E, 0]);
+        assert_eq!(traffic.node(5).unit, Unit::Code(0x004E_0000));
     }
 }

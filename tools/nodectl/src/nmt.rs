@@ -1,5 +1,6 @@
 //! The NMT master on an open bus (CiA 301, 7.3.2.2).
 
+use canopen::client::heartbeat::Heartbeat;
 use canopen::client::nmt::{Change, command};
 use canopen::nmt::{Command, State};
 use canopen::{Duration, NodeId};
@@ -27,4 +28,37 @@ pub fn change(
     time: Duration,
 ) -> Result<Option<State>, BusError> {
     network.run(&mut Change::new(specifier, node, time))
+}
+
+/// After the boot-up message of another node, how long to wait for that of the node itself.
+const OTHERS: Duration = Duration::from_millis(500);
+
+/// Restarts a node and waits for its boot-up message. Returns the node that has booted: LSS may have given it a new
+/// node-ID, which is in force from now on. `None` when none has booted in this time.
+///
+/// # Errors
+/// The bus is lost.
+pub fn restart(
+    network: &mut Network,
+    specifier: Command,
+    node: NodeId,
+    time: Duration,
+) -> Result<Option<NodeId>, BusError> {
+    send(network, specifier, Some(node))?;
+    let (mut until, mut other) = (network.now() + time, None);
+    loop {
+        let booted = network.wait(until, |frame| {
+            let heartbeat = Heartbeat::parse(frame)?;
+            (heartbeat.state == State::Initialising).then_some(heartbeat.node)
+        })?;
+        match booted {
+            Some(booted) if booted == node => return Ok(booted.into()),
+            Some(booted) if other.is_none() => {
+                other = Some(booted);
+                until = until.min(network.now() + OTHERS);
+            }
+            Some(_) => (),
+            None => return Ok(other),
+        }
+    }
 }

@@ -180,7 +180,8 @@ impl Rule {
     }
 
     /// The size in bytes that the data type of an entry with this rule must have; `None` for any size.
-    pub(super) const fn size(self) -> Option<u8> {
+    #[must_use]
+    pub const fn size(self) -> Option<u8> {
         match self {
             Rule::Plain | Rule::Application => None,
             Rule::ErrorCount

@@ -165,7 +165,8 @@ impl Apply {
             let steps = plan(&sheet, &now, &Configuration::of_sheet(&sheet, node));
             return steps.into_iter().try_for_each(|step| session.print(&self.step(&sheet, step)));
         }
-        let written = bring(session, node, &sheet, |session| session.configuration(node, &sheet))?;
+        let wanted = Configuration::of_sheet(&sheet, node);
+        let written = bring(session, node, &sheet, &wanted, |session| session.configuration(node, &sheet))?;
         if self.save {
             sign(session, node, Order::Save, Group::All)?;
         }
@@ -215,20 +216,20 @@ pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Resu
     Ok((device != product).then(words))
 }
 
-/// Writes the parameters that differ from a file, until `read` shows no difference. Returns the parameters that were
-/// written.
+/// Writes the parameters that differ from the wanted ones, until `read` shows no difference. Returns the parameters that
+/// were written.
 pub(super) fn bring(
     session: &mut Session,
     node: NodeId,
     sheet: &Eds,
+    wanted: &Configuration,
     mut read: impl FnMut(&mut Session) -> Result<Configuration, Failure>,
 ) -> Result<Vec<Write>, Failure> {
-    let wanted = Configuration::of_sheet(sheet, node);
     let mut written = Vec::new();
     let mut refusals = BTreeMap::new();
     let mut now = read(session)?;
     for _ in 0..PASSES {
-        let mut steps = plan(sheet, &now, &wanted);
+        let mut steps = plan(sheet, &now, wanted);
         if steps.is_empty() {
             return Ok(written);
         }
@@ -236,7 +237,7 @@ pub(super) fn bring(
         written.append(&mut steps);
         now = read(session)?;
     }
-    let left: Vec<String> = plan(sheet, &now, &wanted)
+    let left: Vec<String> = plan(sheet, &now, wanted)
         .iter()
         .filter(|step| now.values.get(&key(step.at)) != Some(&step.value))
         .map(|step| left(step, &now, &refusals))

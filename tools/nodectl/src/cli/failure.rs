@@ -26,7 +26,8 @@ Exit codes:
   7  a file cannot be read or written
   8  two configurations differ (diff)
   9  the device does not conform (check)
- 10  a rule of the bus is broken (rules)";
+ 10  a rule of the bus is broken (rules)
+ 11  the bus is not as its file says (net)";
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -80,6 +81,9 @@ pub enum Failure {
     /// Rules of the bus are broken; each breach has been printed already.
     #[error("{0} breaches of the rules of the bus")]
     RulesBroken(usize),
+    /// The bus is not as its file says; each finding has been printed already.
+    #[error("{0} findings: the bus is not as its file says")]
+    NotAsPlanned(usize),
     /// A node has other values than the values that were written.
     #[error("still different after it was written: {0}")]
     NotApplied(String),
@@ -137,6 +141,7 @@ impl Failure {
             Failure::Different(_) => 8,
             Failure::NotConforming { .. } => 9,
             Failure::RulesBroken(_) => 10,
+            Failure::NotAsPlanned(_) => 11,
             Failure::NotApplied(_) => 1,
             Failure::Sdo(error) => sdo_code(error),
             Failure::Lss(lss::Error::Service(Service::Refused(..))) => 1,

@@ -1,6 +1,7 @@
 //! `nodectl map` and `nodectl unmap`: the mapping of a PDO in one command.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
@@ -14,19 +15,49 @@ use crate::object::{Place, at};
 /// Maps objects into a PDO, in the five steps of CiA 301: off, empty, objects, their number, on.
 #[derive(Debug, Args)]
 pub(super) struct Map {
-    direction: Direction,
+    #[arg(required_unless_present = "dbc")]
+    direction: Option<Direction>,
 
     /// The number of the PDO, from 1.
-    #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
-    number: u16,
+    #[arg(required_unless_present = "dbc", value_parser = clap::value_parser!(u16).range(1..=512))]
+    number: Option<u16>,
 
     /// Objects by index or name, from the first bit on.
-    #[arg(required = true, value_name = "OBJECT")]
+    #[arg(required_unless_present = "dbc", value_name = "OBJECT")]
     objects: Vec<String>,
+
+    /// Write the TPDOs of the nodes as they are to a DBC file instead ("-" for the standard output).
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["direction", "number", "objects"])]
+    dbc: Option<PathBuf>,
 
     /// The transmission type; unchanged if it is left out.
     #[arg(long = "transmission", value_name = "TYPE")]
     transmission: Option<u8>,
+
+    /// The CAN-ID, in hexadecimal digits after 0x; unchanged if it is left out.
+    #[arg(long, value_name = "CAN-ID", value_parser = can_id)]
+    cob_id: Option<u16>,
+
+    /// The inhibit time in units of 100 us.
+    #[arg(long, value_name = "100 US")]
+    inhibit: Option<u16>,
+
+    /// The event timer in ms.
+    #[arg(long, value_name = "MS")]
+    event_timer: Option<u16>,
+
+    /// The SYNC start value.
+    #[arg(long, value_name = "COUNTER")]
+    sync_start: Option<u8>,
+}
+
+fn can_id(text: &str) -> Result<u16, String> {
+    let number =
+        text.strip_prefix("0x").map_or_else(|| text.parse(), |digits| u16::from_str_radix(digits, 16));
+    number
+        .ok()
+        .filter(|id| (1..0x800).contains(id))
+        .ok_or_else(|| format!("\"{text}\" is no CAN-ID, as 0x181"))
 }
 
 /// Switches a PDO off and empties its mapping.
@@ -154,6 +185,24 @@ impl Pdo {
         self.switch(session, to.cob_id)
     }
 
+    /// Writes inhibit time, event timer and SYNC start value, by sub-index, while the PDO is off (CiA 301, 7.5.2.37). The
+    /// PDO is off afterwards; if the node refuses a value, the PDO is as it was before.
+    pub(super) fn set_times(
+        &self,
+        session: &mut Session,
+        before: &Mapped,
+        times: &[(u8, Vec<u8>)],
+    ) -> Result<(), Failure> {
+        for (sub, bytes) in times {
+            self.switch(session, before.cob_id | OFF)?;
+            if let Err(failure) = self.write(session, at(self.communication, *sub), bytes) {
+                self.switch(session, before.cob_id)?;
+                return Err(failure);
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn switch(&self, session: &mut Session, cob_id: u32) -> Result<(), Failure> {
         self.write(session, at(self.communication, 1), &cob_id.to_le_bytes())
     }
@@ -161,19 +210,26 @@ impl Pdo {
 
 impl Map {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        if let Some(file) = &self.dbc {
+            let nodes = session.options.node.list()?;
+            return super::dbc::write(session, &nodes, file);
+        }
         let node = session.options.node.one()?;
-        let pdo = Pdo::new(node, self.direction, self.number);
+        let (Some(direction), Some(number)) = (self.direction, self.number) else { return Ok(()) };
+        let pdo = Pdo::new(node, direction, number);
         // Look up all objects before any change, so that an error leaves the PDO unchanged.
         let entries: Result<Vec<u32>, Failure> =
-            self.objects.iter().map(|query| self.entry(session, node, query)).collect();
+            self.objects.iter().map(|query| entry(session, direction, node, query)).collect();
         let entries = entries?;
         let bits = fitting_bits(&entries)?;
         let before = pdo.mapped(session)?;
-        let cob_id = before.cob_id & !OFF;
+        let can_id = self.cob_id.map_or(before.cob_id & 0x1FFF_FFFF, u32::from);
+        let cob_id = before.cob_id & !OFF & !0x1FFF_FFFF | can_id;
         let wanted = Mapped { cob_id, entries, transmission: self.transmission.or(before.transmission) };
+        pdo.set_times(session, &before, &self.times())?;
         pdo.remap(session, &before, &wanted)?;
         let entries = &wanted.entries;
-        let name = format!("{:?} {}", self.direction, self.number).to_uppercase();
+        let name = format!("{direction:?} {number}").to_uppercase();
         session.print(&Done {
             node: node.get(),
             pdo: name,
@@ -183,13 +239,21 @@ impl Map {
         })
     }
 
-    /// The mapping entry of an object: index, sub-index, bits.
-    fn entry(&self, session: &mut Session, node: NodeId, query: &str) -> Result<u32, Failure> {
-        let object = session.find(node, query)?;
-        let catalogue = session.catalogue(node)?;
-        let slot = slot(&catalogue, self.direction, object);
-        slot.map_err(|words| Failure::Usage(format!("{query}: {words}")))
+    /// The times to write, by sub-index of the communication parameter.
+    fn times(&self) -> Vec<(u8, Vec<u8>)> {
+        let word = |sub, time: Option<u16>| time.map(|time| (sub, time.to_le_bytes().to_vec()));
+        let times =
+            [word(3, self.inhibit), word(5, self.event_timer), self.sync_start.map(|at| (6, vec![at]))];
+        times.into_iter().flatten().collect()
     }
+}
+
+/// The mapping entry of an object: index, sub-index, bits.
+fn entry(session: &mut Session, direction: Direction, node: NodeId, query: &str) -> Result<u32, Failure> {
+    let object = session.find(node, query)?;
+    let catalogue = session.catalogue(node)?;
+    let slot = slot(&catalogue, direction, object);
+    slot.map_err(|words| Failure::Usage(format!("{query}: {words}")))
 }
 
 /// The mapping entry of an object (index, sub-index, bits), or the reason why the object cannot be mapped.

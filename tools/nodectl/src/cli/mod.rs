@@ -1,6 +1,9 @@
 //! The command line: one file for each command.
 
+mod bus;
+mod by_id;
 mod check;
+mod dbc;
 mod dump;
 mod explain;
 mod failure;
@@ -10,6 +13,7 @@ mod lss;
 mod manual;
 mod map;
 mod monitor;
+mod net;
 mod nmt;
 mod node_set;
 mod options;
@@ -18,11 +22,13 @@ mod paper;
 mod read;
 mod record;
 mod replacement;
+mod replay;
 mod rules;
 mod scan;
 mod serve;
 mod session;
 mod sheets;
+mod simulate;
 mod source;
 mod store;
 mod trace;
@@ -68,6 +74,10 @@ enum Command {
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),
+    Replay(replay::Replay),
+    Bus(bus::Bus),
+    Net(net::Net),
+    Simulate(simulate::Simulate),
     Rules(rules::Rules),
     Save(store::Save),
     Restore(store::Restore),
@@ -108,7 +118,8 @@ impl Cli {
             Command::Trace(trace) => trace.needs_a_bus(),
             Command::Rules(rules) => rules.needs_a_bus(),
             Command::Check(check) => check.needs_a_bus(),
-            Command::Explain(_) | Command::Completions(_) | Command::Man(_) => false,
+            Command::Net(net) => net.needs_a_bus(),
+            Command::Bus(_) | Command::Explain(_) | Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
     }
@@ -132,6 +143,10 @@ impl Cli {
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
             Command::Trace(trace) => trace.run(session),
+            Command::Replay(replay) => replay.run(session),
+            Command::Bus(bus) => bus.run(session),
+            Command::Net(net) => net.run(session),
+            Command::Simulate(simulate) => simulate.run(session),
             Command::Rules(rules) => rules.run(session),
             Command::Save(save) => save.run(session),
             Command::Restore(restore) => restore.run(session),

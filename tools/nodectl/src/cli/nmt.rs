@@ -49,6 +49,21 @@ struct Done {
     state: Option<&'static str>,
 }
 
+/// A node that has booted, and its node-ID from now on.
+#[derive(Serialize)]
+struct Booted {
+    node: u8,
+    state: &'static str,
+    booted: u8,
+}
+
+impl fmt::Display for Booted {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "node {}: {}", self.node, self.state)?;
+        if self.booted == self.node { Ok(()) } else { write!(f, " as node {}", self.booted) }
+    }
+}
+
 impl Nmt {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let (command, wanted) = self.command.meaning();
@@ -67,11 +82,16 @@ impl Nmt {
     }
 }
 
+/// Restarts a node. One that LSS has given a new node-ID boots with it, and answers no more at its old one.
 fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
-    if master::change(&mut session.network, command, node, BOOT)?.is_none() {
-        return Err(Failure::Silence(format!("node {}: no boot-up message", node.get())));
+    let silence = || Failure::Silence(format!("node {}: no boot-up message", node.get()));
+    // Another node may boot at the same time, while there is no node of this node-ID at all.
+    let was_there = session.network.heard(node).is_some() || is_there(session, node)?;
+    let booted = master::restart(&mut session.network, command, node, BOOT)?.ok_or_else(silence)?;
+    if booted != node && (!was_there || is_there(session, node)?) {
+        return Err(silence());
     }
-    session.print(&Done { node: node.get(), state: Some("booted") })
+    session.print(&Booted { node: node.get(), state: "booted", booted: booted.get() })
 }
 
 /// Changes the state. A node without a heartbeat cannot tell its state; then an SDO answer shows that the node exists.

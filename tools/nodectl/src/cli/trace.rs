@@ -10,6 +10,7 @@ use canopen::{Duration, Frame, Instant, NodeId};
 use clap::Args;
 use serde::Serialize;
 
+use super::by_id::{ByCanId, HEAD, service};
 use super::node_set::NodeSet;
 use super::read::place;
 use super::record::seconds_between;
@@ -18,7 +19,7 @@ use super::{Failure, Session};
 use crate::Catalogue;
 use crate::scan::scan;
 use crate::text::{hex_digits, visible};
-use crate::trace::{Decoder, Kind, Knowledge, Line, Record, Shown};
+use crate::trace::{Decoder, Foreign, Kind, Knowledge, Line, Record, Shown};
 use crate::value::Value;
 
 /// The longest wait for a frame, after which the end of the trace is checked.
@@ -51,6 +52,10 @@ pub(super) struct Trace {
     /// Send nothing: PDOs are decoded by the data sheet of `--eds` only.
     #[arg(long)]
     silent: bool,
+
+    /// One line for each CAN-ID at the end: count, period, newest data; and the load of the bus at `--bit-rate`.
+    #[arg(long)]
+    by_id: bool,
 
     /// End after this number of lines.
     #[arg(long, value_name = "N")]
@@ -92,6 +97,8 @@ struct Printer<'t> {
     decoder: Decoder,
     start: Option<Instant>,
     left: usize,
+    /// The frames by CAN-ID, where these are asked for instead of lines.
+    by_id: Option<ByCanId>,
 }
 
 impl Trace {
@@ -102,12 +109,13 @@ impl Trace {
 
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let decoder = self.decoder(session)?;
-        let mut printer =
-            Printer { trace: self, decoder, start: None, left: self.count.unwrap_or(usize::MAX) };
+        let (left, by_id) = (self.count.unwrap_or(usize::MAX), self.by_id.then(ByCanId::default));
+        let mut printer = Printer { trace: self, decoder, start: None, left, by_id };
         match &self.file {
-            Some(path) => printer.file(session, path),
-            None => printer.bus(session),
+            Some(path) => printer.file(session, path)?,
+            None => printer.bus(session)?,
         }
+        printer.by_id.map_or(Ok(()), |counted| print_by_id(session, &counted))
     }
 
     /// A decoder with the knowledge about the nodes.
@@ -153,12 +161,12 @@ impl Trace {
         Ok(answers.map(|(node, _)| node).filter(|node| named.contains(node)).collect())
     }
 
-    fn is_wanted(&self, line: &Line) -> bool {
-        let is_kind =
-            (self.kind.is_empty() || self.kind.contains(&line.kind)) && !self.without.contains(&line.kind);
+    /// Whether the filter has a service and a node.
+    fn is_named(&self, kind: Kind, node: Option<NodeId>) -> bool {
+        let is_kind = (self.kind.is_empty() || self.kind.contains(&kind)) && !self.without.contains(&kind);
         let is_node = match &self.of {
             NodeSet::All => true,
-            NodeSet::These(nodes) => line.node.is_some_and(|node| nodes.contains(&node)),
+            NodeSet::These(nodes) => node.is_some_and(|node| nodes.contains(&node)),
         };
         is_kind && is_node
     }
@@ -185,6 +193,10 @@ impl Printer<'_> {
         {
             match record? {
                 (at, Record::Frame(frame)) => self.frame(session, &frame, at)?,
+                (at, Record::Foreign(frame)) if self.by_id.is_some() => {
+                    let Foreign { id, data, .. } = frame;
+                    self.by_id.iter_mut().for_each(|all| all.add(id, Kind::Other, None, &data, at));
+                }
                 (at, Record::Foreign(frame)) => {
                     self.lines(session, vec![Decoder::on_foreign(frame, at)], at)?;
                 }
@@ -195,19 +207,36 @@ impl Printer<'_> {
 
     fn frame(&mut self, session: &mut Session, frame: &Frame, at: Instant) -> Result<(), Failure> {
         let lines = self.decoder.on_frame(frame, at);
+        if let Some(counted) = &mut self.by_id {
+            let (kind, node) = service(frame.id(), &lines);
+            if self.trace.is_named(kind, node.and_then(NodeId::new)) {
+                counted.add(frame.id().into(), kind, node, frame.data(), at);
+            }
+            return Ok(());
+        }
         self.lines(session, lines, at)
     }
 
     fn lines(&mut self, session: &mut Session, lines: Vec<Line>, at: Instant) -> Result<(), Failure> {
         let start = *self.start.get_or_insert(at);
         for line in lines {
-            if self.left > 0 && self.trace.is_wanted(&line) {
+            if self.left > 0 && self.trace.is_named(line.kind, line.node) {
                 self.left -= 1;
                 session.print(&row(line, start))?;
             }
         }
         Ok(())
     }
+}
+
+/// Prints a line for each CAN-ID, and one for the bus.
+fn print_by_id(session: &mut Session, counted: &ByCanId) -> Result<(), Failure> {
+    if !session.options.json {
+        session.output.write(format!("{HEAD}\n").as_bytes())?;
+    }
+    counted.rows().try_for_each(|row| session.print(&row))?;
+    let bus = counted.bus(session.options.bit_rate);
+    session.print(&bus)
 }
 
 fn row(line: Line, start: Instant) -> Row {

@@ -50,7 +50,7 @@ fn pdo_steps(pdo: u16, changed: &[(u16, u8)], from: &Configuration, to: &Configu
     let Some(Value::Integer(wanted)) = wanted else { return Vec::new() };
     let mut steps = vec![Write { at: at(pdo, 1), value: Value::Integer(wanted | OFF) }];
     if changed.iter().any(|key| key.0 == mapping) {
-        steps.extend(mapping_steps(mapping, changed, to));
+        steps.extend(mapping_steps(mapping, changed, from, to));
     }
     steps.extend(changed.iter().filter(|key| key.0 == pdo && key.1 > 1).filter_map(|key| write(to, *key)));
     if wanted & OFF == 0 {
@@ -60,8 +60,14 @@ fn pdo_steps(pdo: u16, changed: &[(u16, u8)], from: &Configuration, to: &Configu
 }
 
 /// The steps of the mapping: clear it, write each object, write their number.
-fn mapping_steps(mapping: u16, changed: &[(u16, u8)], to: &Configuration) -> Vec<Write> {
-    let count = match to.values.get(&(mapping, 0)) {
+fn mapping_steps(
+    mapping: u16,
+    changed: &[(u16, u8)],
+    from: &Configuration,
+    to: &Configuration,
+) -> Vec<Write> {
+    let key = (mapping, 0);
+    let count = match to.values.get(&key).or_else(|| from.values.get(&key)) {
         Some(Value::Integer(count)) => *count,
         _ => 0,
     };

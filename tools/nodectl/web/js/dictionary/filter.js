@@ -5,12 +5,26 @@ import { isWritable } from "./check.js";
 
 export const SETS = [
   ["all", "all objects"],
+  ["communication", "communication (1000h to 13FFh)"],
+  ["pdo", "PDO parameters (1400h to 1BFFh)"],
+  ["network", "network and program (1C00h to 1FFFh)"],
+  ["manufacturer", "manufacturer (2000h to 5FFFh)"],
+  ["profile", "device profile (6000h and up)"],
   ["favourites", "favourites"],
   ["writable", "those that can be written"],
   ["differs", "those that differ from the default"],
   ["tpdo", "those that a TPDO can carry"],
   ["rpdo", "those that an RPDO can write"],
 ];
+
+/** The first and the last index of each group. */
+const GROUPS = {
+  communication: [0x1000, 0x13ff],
+  pdo: [0x1400, 0x1bff],
+  network: [0x1c00, 0x1fff],
+  manufacturer: [0x2000, 0x5fff],
+  profile: [0x6000, 0xffff],
+};
 
 export const keyOf = ({ index, sub }) => `${index}:${sub}`;
 
@@ -22,6 +36,8 @@ export function matches(entry, search) {
 
 /** Whether an object belongs to a set. */
 export function isIn(entry, set, { favourites, differing }) {
+  const group = GROUPS[set];
+  if (group) return entry.index >= group[0] && entry.index <= group[1];
   switch (set) {
     case "favourites": return favourites.has(keyOf(entry));
     case "writable": return isWritable(entry);

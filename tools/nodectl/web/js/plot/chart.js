@@ -1,16 +1,23 @@
 // One chart: the signals of one unit over time, drawn by Chart.js.
 
-import { el, set } from "../dom.js";
-import { quantity } from "../format.js";
-import { drawMarks } from "./marks.js";
+import { el, set, text } from "../dom.js";
+import { number, quantity } from "../format.js";
+import { legend } from "./export.js";
+import { Limits } from "./limits.js";
+import { drawCursor, drawMarks } from "./marks.js";
+import { points } from "./series.js";
 import { colour, line } from "./theme.js";
 
 export class UnitChart {
-  /** `signals`: `{key, name, position}`; the colour depends on the position. */
+  /** `signals`: `{key, name, position, status}`; the colour depends on the position. */
   constructor(unit, signals, { recorder, time, faults }) {
     Object.assign(this, { unit, signals, recorder, time, faults });
     this.canvas = el("canvas", { tabindex: 0, role: "img" });
-    this.element = el("div", { class: "chart" }, this.canvas);
+    this.limits = new Limits(unit);
+    this.rows = signals.map((signal) => this.#row(signal));
+    const head = ["Signal", "At the cursor", "Least", "Greatest", "Difference"].map((name) => el("th", { scope: "col" }, name));
+    const table = el("table", { class: "extremes" }, el("caption", { class: "unseen" }, `Values in the plot, ${unit || "without a unit"}`), el("thead", {}, el("tr", {}, head)), el("tbody", {}, this.rows.map(({ row }) => row)));
+    this.element = el("div", {}, el("div", { class: "chart" }, this.canvas), el("div", { class: "below" }, el("div", { class: "wide" }, table), this.limits.element));
     this.chart = new window.Chart(this.canvas, this.#configuration());
   }
 
@@ -19,9 +26,11 @@ export class UnitChart {
     const { from, to } = this.time;
     const columns = Math.max(100, this.chart.width);
     this.chart.data.datasets.forEach((drawn, i) => {
-      drawn.data = this.recorder.of(this.signals[i].key).envelope(from, to, columns);
+      drawn.data = points(this.recorder, this.signals[i], from, to, columns);
+      this.#show(this.rows[i], this.signals[i], drawn.data);
     });
     Object.assign(this.chart.options.scales.x, { min: from, max: to });
+    Object.assign(this.chart.options.scales.y, this.limits.values);
     this.chart.update("none");
     set(this.canvas, "aria-label", this.#words());
   }
@@ -37,14 +46,28 @@ export class UnitChart {
     return Math.min(1, Math.max(0, (event.offsetX - left) / (right - left)));
   }
 
+  #row({ name, position }) {
+    const cells = Array.from({ length: 4 }, () => el("td", { class: "number" }));
+    return { cells, row: el("tr", {}, el("th", { scope: "row" }, legend(position), name), cells) };
+  }
+
+  /** The value at the cursor, and the extremes of the shown time. */
+  #show({ cells }, { key }, shown) {
+    const { from, to, cursor } = this.time;
+    const values = shown.filter(({ x, y }) => x >= from && x <= to && typeof y === "number").map(({ y }) => y);
+    const [least, greatest] = values.length ? [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))] : [null, null];
+    const at = cursor == null ? null : this.recorder.of(key).at(cursor);
+    [at, least, greatest, least == null ? null : greatest - least].forEach((value, i) => text(cells[i], typeof value === "number" ? number(value) : "-"));
+  }
+
   #words() {
     const values = this.signals.map(({ key, name }) => `${name} ${quantity(this.recorder.of(key).newest ?? null, this.unit)}`);
     return `Plot of the last ${this.time.length.toPrecision(2)} s: ${values.join(", ")}`;
   }
 
   #configuration() {
-    const [text, grid] = [colour("muted"), colour("edge")];
-    const axis = (title) => ({ type: "linear", grid: { color: grid }, ticks: { color: text, maxTicksLimit: 8 }, title: { display: true, text: title, color: text } });
+    const [words, grid] = [colour("muted"), colour("edge")];
+    const axis = (title) => ({ type: "linear", grid: { color: grid }, ticks: { color: words, maxTicksLimit: 8 }, title: { display: true, text: title, color: words } });
     const y = { ...axis(this.unit || "value"), grace: "5%", afterFit: (scale) => (scale.width = 72) };
     const x = { ...axis("s"), ticks: { ...axis("").ticks, maxRotation: 0, autoSkipPadding: 24, includeBounds: false } };
     return {
@@ -56,7 +79,7 @@ export class UnitChart {
         scales: { x, y },
         plugins: { legend: { display: false }, tooltip: { enabled: false } },
       },
-      plugins: [{ id: "faults", afterDatasetsDraw: (chart) => drawMarks(chart, this.faults()) }],
+      plugins: [{ id: "faults", afterDatasetsDraw: (chart) => (drawMarks(chart, this.faults()), drawCursor(chart, this.time.cursor)) }],
     };
   }
 }

@@ -3,6 +3,7 @@
 import { el, svg } from "../dom.js";
 import { number } from "../format.js";
 import { colourOf } from "./marks.js";
+import { points } from "./series.js";
 import { colour, line } from "./theme.js";
 
 /** A row for each time and a column for each signal, in the format of `nodectl record --csv`. */
@@ -42,7 +43,7 @@ export function drawing(recorder, units, time, faults) {
 }
 
 function drawUnit(group, recorder, unit, signals, { from, to }, faults) {
-  const lines = signals.map((signal) => ({ ...signal, points: recorder.of(signal.key).envelope(from, to, WIDTH - LEFT) }));
+  const lines = signals.map((signal) => ({ ...signal, points: points(recorder, signal, from, to, WIDTH - LEFT) }));
   const values = lines.flatMap(({ points }) => points.map(({ y }) => y)).filter((y) => typeof y === "number");
   const [low, high] = range(values);
   const x = (t) => LEFT + ((Math.min(to, Math.max(from, t)) - from) / (to - from)) * (WIDTH - LEFT - 10);

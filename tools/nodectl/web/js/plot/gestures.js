@@ -19,6 +19,8 @@ export function addGestures(chart, time) {
   });
   canvas.addEventListener("wheel", (event) => zoomByWheel(event, chart, time), { passive: false });
   canvas.addEventListener("dblclick", () => time.follow());
+  canvas.addEventListener("pointermove", (event) => time.point(chart.share(event)));
+  canvas.addEventListener("pointerleave", () => time.point(null));
   addDrag(chart, time);
 }
 

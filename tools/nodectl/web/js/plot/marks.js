@@ -12,6 +12,20 @@ export function drawMarks(chart, faults) {
   ctx.restore();
 }
 
+/** The line at the pointer. */
+export function drawCursor(chart, time) {
+  const { ctx, chartArea: { top, bottom }, scales: { x } } = chart;
+  if (time == null || time < x.min || time > x.max) return;
+  ctx.save();
+  ctx.strokeStyle = colour("text");
+  ctx.lineWidth = 1;
+  ctx.beginPath();
+  ctx.moveTo(x.getPixelForValue(time), top);
+  ctx.lineTo(x.getPixelForValue(time), bottom);
+  ctx.stroke();
+  ctx.restore();
+}
+
 function mark(ctx, { top, bottom }, at, { kind, active }) {
   ctx.strokeStyle = ctx.fillStyle = colour(colourOf(kind, active));
   ctx.lineWidth = active ? 2 : 1;

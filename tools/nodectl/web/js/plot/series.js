@@ -43,6 +43,13 @@ export class Series {
     return low;
   }
 
+  /** The value at a time: that of the last sample until then; `null` before the first one. */
+  at(time) {
+    const next = this.position(time);
+    const at = this.t[next] === time ? next : next - 1;
+    return at < 0 ? null : this.v[at];
+  }
+
   /**
    * What a plot of so many columns shows from one time to another: every sample where there is room, else the first, the least, the
    * greatest and the last one of each column, so that no peak is lost. One sample on either side leads to the edge.
@@ -84,4 +91,13 @@ export class Series {
   #point(at) {
     return { x: this.t[at], y: this.v[at] };
   }
+}
+
+/** The points of a signal. While its status says that the value is not valid, there is a gap. */
+export function points(recorder, { key, status }, from, to, columns) {
+  const all = recorder.of(key).envelope(from, to, columns);
+  const states = status && recorder.series.get(status);
+  if (!states?.t.length) return all;
+  // Bit 0 of 6150h: the value is not valid (CiA 404).
+  return all.map((point) => ((states.at(point.x) ?? 0) & 1 ? { x: point.x, y: null } : point));
 }

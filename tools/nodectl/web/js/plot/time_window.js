@@ -10,6 +10,18 @@ export class TimeWindow extends EventTarget {
     /** The right end; `null` while the plots follow the bus. */
     this.end = null;
     this.now = 0;
+    /** The position of the pointer as a share of the width; `null` without one. */
+    this.pointer = null;
+  }
+
+  /** The time under the pointer; `null` without one. */
+  get cursor() {
+    return this.pointer == null ? null : this.from + this.pointer * this.length;
+  }
+
+  point(share) {
+    this.pointer = share;
+    this.dispatchEvent(new CustomEvent("change"));
   }
 
   get follows() {

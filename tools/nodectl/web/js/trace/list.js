@@ -1,7 +1,7 @@
 // The list of the trace: the newest rows, one of which is chosen by mouse or by Up and Down.
 
 import { el, set } from "../dom.js";
-import { hex } from "../format.js";
+import { bytes, hex } from "../format.js";
 
 /** The number of rows in the list. The browser cannot draw more in time on a full bus. */
 const SHOWN = 400;
@@ -11,8 +11,8 @@ export class List {
     this.onChoose = onChoose;
     this.chosen = null;
     this.body = el("tbody");
-    const head = ["Time s", "CAN-ID", "Kind", "Node", "What"].map((name) => el("th", { scope: "col" }, name));
-    const table = el("table", { class: "frames" }, el("caption", { class: "unseen" }, "Frames, the newest at the end"), el("thead", {}, el("tr", {}, head)), this.body);
+    const head = ["Time s", "Δ ms", "CAN-ID", "Service", "Node", "DLC", "Data", "Content"].map((name) => el("th", { scope: "col" }, name));
+    const table = el("table", { class: "frames list" }, el("caption", { class: "unseen" }, "Frames, the newest at the end"), el("thead", {}, el("tr", {}, head)), this.body);
     this.element = el("div", { class: "wide scroll", tabindex: 0, role: "group", "aria-label": "Frames", on: { keydown: (event) => this.#key(event) } }, table);
     this.body.addEventListener("click", (event) => this.#choose(event.target.closest("tr")));
   }
@@ -51,10 +51,13 @@ export class List {
 }
 
 function line(row) {
-  if (row.gap) return el("tr", { class: "gap" }, el("td", { colspan: 5 }, `${row.gap} rows were dropped here: the page was too slow`));
-  const { t, id, kind, node, text, abort } = row;
+  if (row.gap) return el("tr", { class: "gap" }, el("td", { colspan: 8 }, `${row.gap} rows were dropped here: the page was too slow`));
+  const { t, id, kind, node, text, abort, delta, data = "" } = row;
+  const shown = bytes(data);
   const element = el("tr", { data: { kind, ...(abort == null ? {} : { abort: "yes" }) } },
-    el("td", { class: "number" }, t.toFixed(6)), el("td", {}, hex(id, 3)), el("td", {}, kind), el("td", {}, node ?? "-"), el("td", {}, text));
+    el("td", { class: "number" }, t.toFixed(6)), el("td", { class: "number" }, delta == null ? "-" : (1000 * delta).toFixed(2)),
+    el("td", {}, hex(id, 3)), el("td", {}, kind), el("td", {}, node ?? "-"), el("td", { class: "number" }, String(data.length / 2)),
+    el("td", { class: "octets" }, shown.length > 23 ? `${shown.slice(0, 23)} …` : shown), el("td", {}, text));
   element.row = row;
   return element;
 }

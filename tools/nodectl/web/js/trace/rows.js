@@ -11,12 +11,16 @@ export class Rows {
     this.lost = 0;
     this.forgotten = 0;
     this.number = 0;
+    this.byId = new Map();
   }
 
   /** Takes an event of the trace. Rows that the server has dropped before it become a row of their own. */
   take({ lost, rows }) {
     const fresh = lost > 0 ? [{ gap: lost }, ...rows] : rows;
-    for (const row of fresh) row.number = this.number += 1;
+    for (const row of fresh) {
+      row.number = this.number += 1;
+      if (!row.gap) this.#count(row);
+    }
     this.lost += lost;
     this.rows.push(...fresh);
     const excess = this.rows.length - KEPT;
@@ -29,6 +33,21 @@ export class Rows {
 
   clear() {
     this.rows = [];
+    this.byId.clear();
+  }
+
+  /** Counts the row for its CAN-ID, and gives it the time since the row before. */
+  #count(row) {
+    const known = this.byId.get(row.id);
+    if (!known) {
+      this.byId.set(row.id, { first: row.t, shortest: Infinity, longest: 0, count: 1, row });
+      return;
+    }
+    row.delta = row.t - known.row.t;
+    known.shortest = Math.min(known.shortest, row.delta);
+    known.longest = Math.max(known.longest, row.delta);
+    known.count += 1;
+    known.row = row;
   }
 }
 

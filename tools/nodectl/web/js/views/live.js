@@ -45,7 +45,7 @@ class Live {
   }
 
   #layout() {
-    const head = ["Show", "Object", "Signal", "Value", "Status", "PDO"].map((name) => el("th", { scope: "col" }, name));
+    const head = ["Show", "Object", "Signal", "Value", "Age", "Status", "PDO"].map((name) => el("th", { scope: "col" }, name));
     const table = el("table", { class: "signals" }, el("caption", { class: "unseen" }, "Process values"), el("thead", {}, el("tr", {}, head)), this.table);
     const side = el("div", { class: "side" }, el("div", { class: "wide" }, table), el("h3", {}, "Faults"), this.faults, this.boards.element);
     return el("div", {}, el("div", { class: "bar" }, nodeChoice(this.bus), ...this.#tools()), this.empty, el("div", { class: "live" }, this.plots, side));
@@ -60,8 +60,8 @@ class Live {
         this.pause,
         button("Zoom in", () => this.time.zoom(0.5)),
         button("Zoom out", () => this.time.zoom(2)),
-        button("Back", () => this.time.move(-0.5)),
-        button("Forth", () => this.time.move(0.5))),
+        button("Earlier", () => this.time.move(-0.5)),
+        button("Later", () => this.time.move(0.5))),
       el("div", { class: "group", role: "group", "aria-label": "Export" }, button("CSV", () => this.#csv()), button("SVG", () => this.#svg())),
     ];
   }
@@ -118,11 +118,11 @@ class Live {
       this.shown.set(signal.signal, box.checked);
       this.#makeCharts();
     });
-    const [value, status] = [el("td", { class: "number" }), el("td")];
+    const [value, age, status] = [el("td", { class: "number" }), el("td", { class: "number age" }), el("td")];
     const pdo = signal.tpdo == null ? "SDO" : `TPDO ${signal.tpdo}`;
     const name = el("th", { scope: "row" }, legend(position), signal.name);
-    const row = el("tr", { data: { signal: signal.signal } }, el("td", {}, box), el("td", {}, address(signal.index, signal.sub)), name, value, status, el("td", {}, pdo));
-    return { row, value, status, signal };
+    const row = el("tr", { data: { signal: signal.signal } }, el("td", {}, box), el("td", {}, address(signal.index, signal.sub)), name, value, age, status, el("td", {}, pdo));
+    return { row, value, age, status, signal };
   }
 
   #makeCharts() {
@@ -139,7 +139,7 @@ class Live {
       if (!this.shown.get(signal.signal) || signal.kind === "text") return;
       if (!units.has(signal.unit)) units.set(signal.unit, []);
       const title = `${address(signal.index, signal.sub)} ${signal.name}`;
-      units.get(signal.unit).push({ key: signal.signal, name: signal.name, title, unit: signal.unit, position });
+      units.get(signal.unit).push({ key: signal.signal, name: signal.name, title, unit: signal.unit, position, status: statusKey(signal) });
     });
     return [...units].map(([unit, signals]) => ({ unit, signals }));
   }
@@ -163,11 +163,16 @@ class Live {
     for (const row of this.rows ?? []) this.#showValue(row);
   }
 
-  #showValue({ value, status, signal }) {
+  #showValue({ value, age, status, signal }) {
     const series = this.recorder.of(signal.signal);
     const state = this.bus.node()?.state;
     const isOld = signal.tpdo != null && state !== "operational";
-    if (series.newest === undefined && !isOld) return;
+    const since = series.t.length ? Math.max(0, this.recorder.t - series.t.at(-1)) : null;
+    text(age, since == null ? "-" : seconds(since, since < 10 ? 2 : 0));
+    if (series.newest === undefined && !isOld) {
+      text(status, signal.tpdo == null ? "not read yet" : `TPDO ${signal.tpdo} has not come: it is sent on its events (type, event timer)`);
+      return;
+    }
     text(value, isOld ? "-" : quantity(series.newest, signal.unit));
     const words = isOld ? `not sent: ${state ?? "not heard"}` : (series.meaning ?? this.#statusOf(signal) ?? (series.newest == null ? "not valid" : "ok"));
     text(status, words);

@@ -24,7 +24,11 @@ function tools(bus, result) {
   return el("div", { class: "bar" }, button("Scan", scan), el("div", { class: "group", role: "group", "aria-label": "All nodes" }, all));
 }
 
+/** Commands that end the work of a bus are confirmed where they go to all nodes. */
+const ENDING = ["stop", "preop", "reset", "reset-communication"];
+
 function command_(bus, result, node, command) {
+  if (node === "all" && ENDING.includes(command) && !confirm(`Send "${command}" to all nodes?`)) return undefined;
   const who = node === "all" ? "all nodes" : `node ${node}`;
   const said = ({ state }) => `${who}: ${command}${state ? `, now ${state}` : ", sent"}`;
   return result.of(`${who}: ${command}`, bus.request("nmt", { node, command }), said);

@@ -5,6 +5,7 @@ import { offer } from "../file.js";
 import { hex } from "../format.js";
 import { announce } from "../announce.js";
 import { details } from "../trace/details.js";
+import { ById } from "../trace/by_id.js";
 import { List } from "../trace/list.js";
 import { Filter, KINDS, Rows } from "../trace/rows.js";
 
@@ -16,7 +17,9 @@ export function trace(bus) {
 class Trace {
   constructor(bus) {
     Object.assign(this, { bus, rows: new Rows(), filter: new Filter(), isPaused: false, waiting: [], isShown: false });
-    this.list = new List((row) => this.details.replaceChildren(...details(row)));
+    const choose = (row) => this.details.replaceChildren(...details(row));
+    this.list = new List(choose);
+    this.byId = new ById(choose);
     this.details = el("aside", { class: "frame-details", "aria-label": "Details of the frame", "aria-live": "polite" }, ...details(null));
     this.count = el("p", { class: "hint" });
     this.search = el("input", { type: "search", placeholder: "words or CAN-ID", autocomplete: "off" });
@@ -44,12 +47,17 @@ class Trace {
     this.node = select([["", "all"]], "", (node) => ((this.filter.node = node), this.#show()));
     this.follow = el("input", { type: "checkbox", prop: { checked: true } });
     this.list.element.addEventListener("keydown", (event) => event.key === " " && (event.preventDefault(), this.#toggle()));
+    this.isById = el("input", { type: "checkbox" });
+    this.isById.addEventListener("change", () => {
+      [this.list.element.hidden, this.byId.element.hidden] = [this.isById.checked, !this.isById.checked];
+      this.#show();
+    });
     const kinds = KINDS.map((kind) => this.#kind(kind));
     return el("div", {},
-      el("div", { class: "bar" }, field("Search", this.search), field("Node", this.node), this.pause, el("label", {}, this.follow, " follow"),
+      el("div", { class: "bar" }, field("Search", this.search), field("Node", this.node), this.pause, el("label", {}, this.follow, " follow"), el("label", {}, this.isById, " by CAN-ID"),
         button("Clear", () => (this.rows.clear(), this.#show())), button("Save", () => this.#save())),
       el("fieldset", { class: "kinds" }, el("legend", {}, "Services"), kinds),
-      this.count, el("div", { class: "split" }, this.list.element, this.details));
+      this.count, el("div", { class: "split" }, this.list.element, this.byId.element, this.details));
   }
 
   #kind(kind) {
@@ -75,7 +83,10 @@ class Trace {
 
   #append() {
     this.isAsked = false;
-    if (!this.isPaused && this.isShown) {
+    if (!this.isPaused && this.isShown && this.isById.checked) {
+      this.waiting = [];
+      this.#showById();
+    } else if (!this.isPaused && this.isShown) {
       this.list.append(this.waiting.filter((row) => this.filter.wants(row)));
       this.waiting = [];
       if (this.follow.checked) this.list.toEnd();
@@ -85,7 +96,7 @@ class Trace {
 
   #toggle() {
     this.isPaused = !this.isPaused;
-    text(this.pause, this.isPaused ? "Go on" : "Pause");
+    text(this.pause, this.isPaused ? "Continue" : "Pause");
     set(this.pause, "aria-pressed", String(this.isPaused));
     if (!this.isPaused) this.#show();
     else this.waiting = [];
@@ -95,9 +106,14 @@ class Trace {
   /** All kept rows that pass the filter. */
   #show() {
     this.waiting = [];
+    if (this.isById.checked) this.#showById();
     this.list.replace(this.rows.rows.filter((row) => this.filter.wants(row)));
     if (this.follow.checked) this.list.toEnd();
     this.#count();
+  }
+
+  #showById() {
+    this.byId.show(this.rows.byId, (row) => this.filter.wants(row));
   }
 
   #count() {

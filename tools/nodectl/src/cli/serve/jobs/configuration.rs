@@ -81,7 +81,7 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
         } else {
             let mut counter = context.counter();
             let read = |session: &mut Session| session.configuration_with(node, &sheet, &mut counter);
-            bring(&mut context.session, node, &sheet, read)?
+            bring(&mut context.session, node, &sheet, &Configuration::of_sheet(&sheet, node), read)?
         };
         let saved = how.save && !how.dry_run;
         if saved {

@@ -134,20 +134,8 @@ fn remap(context: &mut Context, pdo: &Pdo, catalogue: &Catalogue, mapping: &Mapp
     };
     let transmission = mapping.transmission.or(before.transmission);
     let wanted = Mapped { cob_id: cob_id & !OFF, entries, transmission };
-    times(context, pdo, mapping, &before)?;
+    let time = |sub, time: Option<u16>| time.map(|time| (sub, time.to_le_bytes().to_vec()));
+    let times: Vec<_> = [time(3, mapping.inhibit), time(5, mapping.event)].into_iter().flatten().collect();
+    pdo.set_times(&mut context.session, &before, &times)?;
     pdo.remap(&mut context.session, &before, &wanted)
-}
-
-/// Writes inhibit time and event timer, while the PDO is off (CiA 301, 7.5.2.37).
-fn times(context: &mut Context, pdo: &Pdo, mapping: &Mapping, before: &Mapped) -> Result<(), Failure> {
-    let session = &mut context.session;
-    for (sub, time) in [(3, mapping.inhibit), (5, mapping.event)] {
-        let Some(time) = time else { continue };
-        pdo.switch(session, before.cob_id | OFF)?;
-        if let Err(failure) = pdo.write(session, at(pdo.communication, sub), &time.to_le_bytes()) {
-            pdo.switch(session, before.cob_id)?;
-            return Err(failure);
-        }
-    }
-    Ok(())
 }

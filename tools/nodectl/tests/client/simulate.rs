@@ -1,0 +1,125 @@
+//! Simulated devices out of data sheets: SDO, PDO, EMCY, storing, LSS, and `nodectl check`.
+
+use std::path::PathBuf;
+
+use canopen::NodeId;
+use eds::Eds;
+use nodectl::Catalogue;
+use nodectl::bus::Station;
+use nodectl::object::at;
+use nodectl::simulate::{Node, Script, Table};
+
+use crate::commands::{printed, run};
+use crate::wire::{Wire, client};
+
+pub(crate) fn corpus(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../eds/tests/corpus").join(name)
+}
+
+pub(crate) fn sheet(name: &str) -> Eds {
+    Eds::from_bytes(&std::fs::read(corpus(name)).expect("a file")).expect("a data sheet")
+}
+
+/// A simulated device of a data sheet of the corpus.
+pub(crate) fn device(name: &str, node: u8) -> Node {
+    let node = NodeId::new(node);
+    Node::new(Table::new(&sheet(name), node).expect("a table"), node)
+}
+
+fn with_script(name: &str, node: u8, script: &str) -> Node {
+    let script = Script::parse(script, &Catalogue::new(sheet(name))).expect("a script");
+    device(name, node).with_script(script)
+}
+
+/// `--eds` and the file.
+fn eds(name: &str) -> [String; 2] {
+    ["--eds".to_owned(), corpus(name).to_string_lossy().into_owned()]
+}
+
+fn with_eds<S: Station + 'static>(wire: &Wire<S>, name: &str, line: &[&str]) -> String {
+    let eds = eds(name);
+    let line: Vec<&str> = line.iter().copied().chain(eds.iter().map(String::as_str)).collect();
+    printed(wire, &line)
+}
+
+#[test]
+fn every_data_sheet_of_the_corpus_makes_a_device_that_answers_as_it_says() {
+    let folder = std::fs::read_dir(corpus("")).expect("the corpus");
+    let mut count = 0;
+    for path in folder.map(|entry| entry.expect("an entry").path()) {
+        if path.extension().is_none_or(|ending| ending == "txt") {
+            continue;
+        }
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let sheet = sheet(&name);
+        let wire = Wire::new(device(&name, 5));
+        let mut network = wire.network();
+        let mut node = client(&mut network, 5);
+        for entry in sheet.entries().filter(|entry| entry.access.is_readable() && entry.index < 0x1003) {
+            let wanted = entry.default.as_ref().map(|value| value.evaluate(NodeId::new(5).unwrap()));
+            let bytes =
+                node.upload(at(entry.index, entry.sub)).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let is = nodectl::value::Value::decode(&bytes, entry.data_type);
+            if let (Some(eds::Value::Integer(wanted)), nodectl::value::Value::Integer(is)) = (wanted, is) {
+                assert_eq!(is, wanted, "{name}: {:04X}h:{}", entry.index, entry.sub);
+            }
+        }
+        count += 1;
+    }
+    assert!(count >= 60, "{count}");
+}
+
+#[test]
+fn a_drive_is_read_written_and_stored_by_its_names() {
+    let wire = Wire::new(device("plain-drive.eds", 7));
+    let line = |words: &[&str]| with_eds(&wire, "plain-drive.eds", &[words, &["-n", "7"]].concat());
+    assert_eq!(line(&["read", "Profile velocity"]), "6081h:0 Profile velocity = 1000 (000003E8h)\n");
+    assert_eq!(line(&["write", "Profile velocity", "1500"]), "6081h:0 Profile velocity = 1500 (000005DCh)\n");
+    line(&["save"]);
+    line(&["nmt", "reset"]);
+    assert_eq!(line(&["read", "Profile velocity"]), "6081h:0 Profile velocity = 1500 (000005DCh)\n");
+    // The limits are those of the data sheet.
+    let eds = eds("plain-drive.eds");
+    let (_, result) = run(&wire, &["write", "6081", "60001", "-n", "7", &eds[0], &eds[1]]);
+    assert_eq!(result.unwrap_err().exit_code(), 1);
+}
+
+#[test]
+fn a_script_sets_values_that_come_by_tpdo_and_emcy() {
+    let script = "0.5 Pressure = 1.5\n1.0 emcy 4200\n1.5 emcy 0\n2 repeat\n";
+    let wire = Wire::new(with_script("plain-pressure.eds", 3, script));
+    let eds = eds("plain-pressure.eds");
+    printed(&wire, &["nmt", "start", "-n", "3"]);
+    let lines = printed(&wire, &["trace", "--for", "3", "--kind", "pdo,emcy", &eds[0], &eds[1]]);
+    assert!(lines.contains("Pressure = 1.5"), "{lines}");
+    assert!(lines.contains("4200h") && lines.contains("0000h"), "{lines}");
+}
+
+#[test]
+fn a_device_without_a_node_id_is_found_by_lss() {
+    let sheet = sheet("plain-valve.eds");
+    let mut node = Node::new(Table::new(&sheet, None).expect("a table"), None);
+    node.set(at(0x1018, 4), &77_u32.to_le_bytes());
+    let wire = Wire::new(node);
+    let lines = printed(&wire, &["lss", "scan", "--step", "5", "--assign", "40"]);
+    assert!(lines.contains("serial number 0000004Dh, node-ID 40"), "{lines}");
+    assert!(printed(&wire, &["read", "1018:4", "-n", "40"]).contains("0000004Dh"));
+}
+
+/// A reset communication after a new node-ID: the node boots with another one.
+#[test]
+fn reset_communication_finds_the_node_under_its_new_node_id() {
+    let wire = Wire::new(device("plain-valve.eds", 5));
+    printed(&wire, &["lss", "set-id", "11"]);
+    assert_eq!(printed(&wire, &["nmt", "reset-comm", "-n", "5"]), "node 5: booted as node 11\n");
+}
+
+#[test]
+fn simulated_devices_pass_the_check_of_nodectl() {
+    for name in ["plain-io.eds", "plain-drive.eds", "plain-encoder.eds", "plain-pump.eds"] {
+        let wire = Wire::new(device(name, 5));
+        let eds = eds(name);
+        let (lines, result) = run(&wire, &["check", "-n", "5", &eds[0], &eds[1]]);
+        assert!(result.is_ok(), "{name}: {lines}");
+    }
+}
