@@ -1,6 +1,7 @@
 //! One emulated board: the machine that runs the images, its flash, its log, and its counters.
 
 use std::rc::Rc;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
@@ -55,6 +56,17 @@ pub enum Programs {
     Others,
 }
 
+/// How far all boards run next.
+#[derive(Clone, Copy)]
+pub(crate) struct Turn {
+    /// The end of the turn.
+    pub(crate) limit: Time,
+    /// A frame is on the wire: a request can wait for its end.
+    pub(crate) bus_is_busy: bool,
+    /// The host's time is measured.
+    pub(crate) is_measured: bool,
+}
+
 /// One emulated board.
 pub struct Board {
     id: u8,
@@ -69,6 +81,8 @@ pub struct Board {
     locked_up: Option<u32>,
     /// Whether the supply was above the level of the chip's reset.
     is_supplied: bool,
+    /// The host's time for this board, if measured.
+    host: Duration,
 }
 
 impl Board {
@@ -112,6 +126,7 @@ impl Board {
             log: Log::default(),
             locked_up: None,
             is_supplied: true,
+            host: Duration::ZERO,
         })
     }
 
@@ -135,30 +150,50 @@ impl Board {
         self.machine.flash_changes()
     }
 
-    /// Runs to `limit`, or to the request of a frame if that comes first; returns the instant reached.
-    pub(crate) fn run_until(&mut self, limit: Time) -> Time {
-        let limit = self.follow_supply(limit);
-        let stop = self.machine.run_until(limit);
-        self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
-        if stop == Stop::Poked { limit.min(self.machine.now()) } else { limit }
+    /// The earliest instant at which the board can request a frame, if the bus changes nothing before.
+    pub(crate) fn next_event(&self) -> Time {
+        self.machine.next_event().min(self.next_look())
+    }
+
+    /// Runs to the end of a turn, or to an earlier request of a frame on an idle bus; returns the instant reached.
+    pub(crate) fn run(&mut self, turn: Turn) -> Time {
+        let start = turn.is_measured.then(Instant::now);
+        let limit = self.follow_supply(turn.limit);
+        let reached = loop {
+            let stop = self.machine.run_until(limit);
+            self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
+            match stop {
+                Stop::Poked if turn.bus_is_busy => {}
+                Stop::Poked => break limit.min(self.machine.now()),
+                _ => break limit,
+            }
+        };
+        self.host += start.map_or(Duration::ZERO, |start| start.elapsed());
+        reached
     }
 
     /// Switches the chip on or off where the supply crosses the level of its reset. Returns the instant of the next look
     /// at a supply that changes, or `limit`.
     fn follow_supply(&mut self, limit: Time) -> Time {
-        const LOOK: Time = Time::from_micros(100);
         let (now, chip) = (self.machine.now(), self.machine.peripherals());
-        let is_steady = matches!(chip.plant().supply_signal(), Signal::Constant(_));
         let is_supplied = chip.is_supplied(now, self.is_supplied);
         if is_supplied != self.is_supplied {
             self.is_supplied = is_supplied;
             if is_supplied { self.machine.power_on(now) } else { self.machine.power_off() }
         }
-        if is_steady { limit } else { limit.min(now + LOOK) }
+        limit.min(self.next_look())
     }
 
-    /// Core, memory and chip.
+    /// The next look at the supply.
+    fn next_look(&self) -> Time {
+        const LOOK: Time = Time::from_micros(100);
+        let is_steady = matches!(self.machine.peripherals().plant().supply_signal(), Signal::Constant(_));
+        if is_steady { Time::NEVER } else { self.machine.now() + LOOK }
+    }
+
+    /// Core, memory and chip, for a change from outside.
     pub(crate) fn machine(&mut self) -> &mut Machine<Stm32f4> {
+        self.machine.stir();
         &mut self.machine
     }
 
@@ -170,7 +205,7 @@ impl Board {
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
         // The board may have run a few instructions further, and the chip's time cannot go back.
         let now = now.max(self.machine.now());
-        stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
+        stimulus.act_on(self.machine().peripherals_mut().plant_mut(now), now);
     }
 
     /// The current stimuli of the sensors.
@@ -266,6 +301,7 @@ impl Board {
             id: self.id,
             personality: self.personality,
             heard,
+            host_seconds: (!self.host.is_zero()).then_some(self.host.as_secs_f64()),
             sampling: figures::sampling(&self.machine),
             receiving: figures::receiving(&self.machine),
             cpu: figures::cpu(&self.machine),

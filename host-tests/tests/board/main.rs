@@ -37,5 +37,6 @@ mod stack;
 mod start_up;
 mod supply;
 mod support;
+mod threads;
 mod timing;
 mod update;
