@@ -1,7 +1,7 @@
 //! The state that the hooks of the CPU library share with the run loop: clock, interrupt controller, system
 //! registers, and the chip behind them.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use canbus::Time;
 use chip::{Breach, Effect, Peripherals};
@@ -89,6 +89,8 @@ pub(crate) struct Core<P> {
     pub(crate) lost_store: Option<u32>,
     /// Broken rules, each with its instant and the address of the code.
     pub(crate) breaches: VecDeque<(Time, u32, Breach)>,
+    /// All of them so far: each is reported once.
+    told: BTreeSet<Breach>,
     /// The address of the last counted code.
     pub(crate) place: u32,
     pub(crate) effects: VecDeque<Effect>,
@@ -163,6 +165,7 @@ impl<P: Peripherals> Core<P> {
             denied: None,
             lost_store: None,
             breaches: VecDeque::new(),
+            told: BTreeSet::new(),
             place: 0,
             effects: VecDeque::new(),
             pended: [Time::ZERO; Exception::COUNT],
@@ -342,9 +345,11 @@ impl<P: Peripherals> Core<P> {
         self.effects.iter().rfind(is_one).cloned()
     }
 
-    /// Records a broken rule with the current time and address.
+    /// Records a broken rule with the current time and address, once.
     pub(crate) fn report(&mut self, breach: Breach) {
-        self.breaches.push_back((self.now, self.place, breach));
+        if self.told.insert(breach) {
+            self.breaches.push_back((self.now, self.place, breach));
+        }
     }
 
     pub(crate) fn pend(&mut self, exception: Exception) {

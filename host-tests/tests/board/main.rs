@@ -1,6 +1,7 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images --development` builds them.
 
 mod adapter;
+mod barriers;
 mod bringup;
 mod budget;
 mod bus_faults;
