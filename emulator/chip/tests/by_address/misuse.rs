@@ -37,7 +37,7 @@ const ROWS: &[Row] = &[
         bypassed_crystal,
         "HSE is switched on for a clock, but the board has a crystal",
     ),
-    ("an erase by double words", |rig, wrong| erase_with(rig, wrong), "double words without VPP"),
+    ("an erase by double words", erase_with, "double words without VPP"),
     ("programming by double words", program_with, "double words without VPP"),
     (
         "ADON and SWSTART at once",
