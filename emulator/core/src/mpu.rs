@@ -92,12 +92,14 @@ impl Mpu {
         let exponent = (region.attributes >> 1 & 0x1F) + 1;
         let is_divided = region.attributes & 0xFF00 != 0;
         let finest = if is_divided { exponent.saturating_sub(3) } else { exponent };
-        match region.attributes & ACCESS {
-            FULL_ACCESS => None,
-            _ if region.attributes & 1 == 0 => None,
-            _ if finest < PAGE => Some("a region of less than a kilobyte that protects data"),
-            NOBODY | READ_ONLY | READ_ONLY_TOO => None,
-            _ => Some("a region that protects data from unprivileged code"),
+        let access = region.attributes & ACCESS;
+        let is_for_all = matches!(access, NOBODY | READ_ONLY | READ_ONLY_TOO);
+        if region.attributes & 1 == 0 || access == FULL_ACCESS {
+            None
+        } else if finest < PAGE {
+            Some("a region of less than a kilobyte that protects data")
+        } else {
+            (!is_for_all).then_some("a region that protects data from unprivileged code")
         }
     }
 
@@ -110,8 +112,8 @@ impl Mpu {
         }
         let region = self.regions.iter().rev().find(|region| region.covers(address));
         match region.map(|region| region.attributes & ACCESS) {
-            None if self.control & PRIVDEFENA == 0 => Prot::NONE,
-            Some(NOBODY) => Prot::NONE,
+            None if self.control & PRIVDEFENA != 0 => all,
+            None | Some(NOBODY) => Prot::NONE,
             Some(PRIVILEGED_READ_ONLY | READ_ONLY | READ_ONLY_TOO) => Prot::READ,
             _ => all,
         }
