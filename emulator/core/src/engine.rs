@@ -234,8 +234,8 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
         let address = base + offset as u32;
         if !core.bugs.ignores_order(address) {
             core.wait_for_stores(address);
+            core.wait_for_bus(address, true);
         }
-        core.wait_for_bus(address, true);
         let value = core.chip.read(address, size as u8, core.now);
         finish_load(core, address, value.is_ok());
         u64::from(core.bugs.seen(address, value.unwrap_or(0)))

@@ -31,8 +31,8 @@ pub enum Access {
         /// The ignored bits.
         bits: u32,
     },
-    /// A read does not wait for a store on its way to the same bus, as if it were not there. The difference shows after
-    /// [`Machine::interleave`] only.
+    /// A read waits neither for a store on its way to the same bus nor for the bus, as if it were not there. The first shows
+    /// after [`Machine::interleave`] only.
     Unordered,
 }
 

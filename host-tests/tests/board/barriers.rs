@@ -75,7 +75,7 @@ fn barriers(elf: &[u8]) -> Vec<(u32, String)> {
 }
 
 /// None of them alone is what the images stand on: the flags of a task are cleared at its begin, so its last store has arrived
-/// long before it returns, and the writes of the backup memory begin with a checksum.
+/// long before it returns.
 #[test]
 fn without_one_barrier_the_images_still_run() {
     let right = run(|_| ());
@@ -94,9 +94,11 @@ fn without_one_barrier_the_images_still_run() {
     }
 }
 
+/// DBP is set on a slow bus, and the memory is on a fast one.
 #[test]
-fn without_the_read_back_of_pwr_the_images_still_run() {
-    let right = run(|_| ());
+fn the_read_back_of_pwr_keeps_the_backup_memory_waiting() {
     let said = run(|world| world.machine(0).seed(Bug { register: PWR_CR, access: Access::Unordered }));
-    assert_eq!(said, right);
+    println!("without the read-back: {said:?}");
+    let rule = "is written while the backup domain is protected";
+    assert!(said.told.iter().any(|told| told.contains(rule)), "{:?}", said.told);
 }
