@@ -224,7 +224,7 @@ pub(super) const STORES: &[Row] = &[
         .with(Node::LowSupply),
     missing("flash not unlocked", FLASH_KEYR, "a save is refused").with(Node::Saving),
     wrong("flash not in programming mode", FLASH_CR, 1 << 0, 0, "a save is refused").with(Node::Saving),
-    wrong("flash erased by double words", FLASH_CR, 0b11 << 8, 0b11 << 8, "double words without VPP")
+    wrong("flash erased by double words", FLASH_CR, 0b11 << 8, 0b11 << 8, "a save is refused")
         .with(Node::Saving),
     wrong("flash programmed by bytes", FLASH_CR, 0b11 << 8, 0, "a save is refused").with(Node::Saving),
     // Core.
