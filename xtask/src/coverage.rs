@@ -6,8 +6,8 @@ use std::process::Command;
 use anyhow::{Context, Result};
 use start::{Package, is_installed};
 
-use crate::command::{cargo, root, run};
 use crate::apt;
+use crate::command::{cargo, root, run};
 use crate::tools;
 
 /// The measured crates, and below them the crates whose tests run as well.

@@ -36,6 +36,11 @@ impl Bus {
         self.busy + self.slot.as_ref().map_or(Time::ZERO, |slot| now.min(slot.end()) - slot.start())
     }
 
+    /// Whether a frame is on the wire, or the intermission after it. No other frame can begin before their end.
+    pub fn is_busy(&self) -> bool {
+        self.slot.is_some()
+    }
+
     /// Frames begun, including those that failed. The fault injector gives the next frame this number.
     pub fn frames(&self) -> u64 {
         self.frames

@@ -94,10 +94,11 @@ impl Stm32f4 {
             Unit::Can(0) if offset == 0 && value & 0b11 == 0 => self.check_can(),
             Unit::Rcc | Unit::Pwr | Unit::Flash => {
                 self.check_dividers();
+                self.check_oscillator();
                 self.rules.conversions_checked = false;
                 self.check_clocks();
             }
-            Unit::Dma(controller) => self.check_flags(controller),
+            Unit::Dma(controller) => self.check_streams(controller),
             Unit::Spi(spi) => self.check_ssi(spi),
             Unit::Adc | Unit::AdcCommon | Unit::Gpio(_) => self.rules.conversions_checked = false,
             _ => {}
@@ -151,6 +152,7 @@ impl Stm32f4 {
                 self.rules.check(!self.flash.is_busy(now), Breach::SystemMemory);
                 signature::read(self.variant, self.board.unique_id, offset)
             }
+            Unit::Options => self.flash.option_bytes(offset),
             Unit::Absent => None,
         }
     }
@@ -158,7 +160,12 @@ impl Stm32f4 {
     fn write_unit(&mut self, unit: Unit, offset: u32, value: u32, now: Time) -> Result<(), Refusal> {
         let done = match unit {
             Unit::Rcc => self.write_rcc(offset, value, now),
-            Unit::Pwr => self.pwr.write(offset, value),
+            Unit::Pwr => {
+                let before = self.pwr.scale();
+                let done = self.pwr.write(offset, value);
+                self.check_regulator(before);
+                done
+            }
             Unit::Flash => {
                 let done = self.flash.write(offset, value, now, &mut self.effects);
                 self.check_flash_supply(now);
@@ -179,7 +186,7 @@ impl Stm32f4 {
             Unit::BackupRam if !self.pwr.backup_is_writable() => return Err(Refusal::Protected),
             Unit::BackupRam if self.losses.take(Loss::BackupStore) => Some(()),
             Unit::BackupRam => self.backup_ram.write(offset, value),
-            Unit::Signature | Unit::Absent => None,
+            Unit::Signature | Unit::Options | Unit::Absent => None,
         };
         done.ok_or(Refusal::NotModelled)
     }

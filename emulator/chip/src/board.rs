@@ -28,6 +28,8 @@ impl ButtonPin {
 pub struct Board {
     /// Frequency of the clock on OSC_IN in hertz; `None` without one.
     pub hse: Option<u64>,
+    /// Whether that is a clock, as from an ST-LINK; otherwise it is a crystal.
+    pub hse_is_clock: bool,
     /// Frequency of the LSI in hertz: 17,000 to 47,000 (DS10693, LSI oscillator characteristics).
     pub lsi: u32,
     /// The analogue front end.
@@ -51,6 +53,7 @@ impl Default for Board {
     fn default() -> Self {
         Self {
             hse: Some(8_000_000),
+            hse_is_clock: true,
             lsi: 32_000,
             front_end: FrontEnd::default(),
             standby: ('B', 12, true),

@@ -86,7 +86,13 @@ impl Stm32f4 {
             Unit::Can(_) => self.can.reset_can2(),
             Unit::Iwdg => self.iwdg = Iwdg::new(self.board.lsi),
             Unit::Crc => self.crc = CrcUnit::new(),
-            Unit::Rcc | Unit::Flash | Unit::Dbgmcu | Unit::BackupRam | Unit::Signature | Unit::Absent => {}
+            Unit::Rcc
+            | Unit::Flash
+            | Unit::Dbgmcu
+            | Unit::BackupRam
+            | Unit::Signature
+            | Unit::Options
+            | Unit::Absent => {}
         }
     }
 }

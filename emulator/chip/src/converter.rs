@@ -86,6 +86,7 @@ impl Stm32f4 {
 
     fn finish_conversion(&mut self, at: Time) {
         self.check_conversions();
+        self.check_stability();
         let code = self.adc.sample().map_or(0, |sample| quantise(self.analogue(sample)));
         self.adc.finish(code);
         if self.adc.requests() {

@@ -35,6 +35,8 @@ pub(crate) enum Unit {
     Crc,
     BackupRam,
     Signature,
+    /// The option bytes.
+    Options,
     /// The chip has the peripheral, but the emulator has no model of it.
     Absent,
 }
@@ -85,7 +87,7 @@ impl Unit {
     /// Whether a store at this offset affects no later event, no interrupt line and nothing outside the chip.
     pub(crate) fn is_passive(self, offset: u32) -> bool {
         match self {
-            Unit::Crc | Unit::BackupRam | Unit::Signature => true,
+            Unit::Crc | Unit::BackupRam | Unit::Signature | Unit::Options => true,
             // ODR and BSRR.
             Unit::Gpio(_) => matches!(offset, 0x14 | 0x18),
             _ => false,
@@ -114,7 +116,7 @@ const BLOCKS: &[Block] = &[
     absent(0x1FFF_0000, "SYSTEM_MEMORY", None).size(0x7800),
     absent(0x1FFF_7800, "OTP", None).size(0x210),
     block(signature::BASE, "SIGNATURE", Unit::Signature, None).size(0x20),
-    absent(0x1FFF_C000, "OPTION_BYTES", None).size(0x10),
+    block(0x1FFF_C000, "OPTION_BYTES", Unit::Options, None).size(0x10),
     block(0x4000_0000, "TIM2", Unit::Timer(0), Gate::apb1(0)),
     block(0x4000_0400, "TIM3", Unit::Timer(1), Gate::apb1(1)),
     block(0x4000_0800, "TIM4", Unit::Timer(2), Gate::apb1(2)),

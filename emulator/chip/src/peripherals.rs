@@ -35,7 +35,7 @@ impl IrqLines {
 pub struct BusFault;
 
 /// The settings for reads of the flash.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FlashAccess {
     /// Extra cycles of a read.
     pub wait_states: u32,
@@ -43,6 +43,10 @@ pub struct FlashAccess {
     pub caches_code: bool,
     /// The data cache is on.
     pub caches_constants: bool,
+    /// How often the program has emptied the instruction cache.
+    pub code_resets: u32,
+    /// How often it has emptied the data cache.
+    pub constant_resets: u32,
 }
 
 /// A request of the chip to its environment; requests are carried out in order.
@@ -97,9 +101,19 @@ pub trait Peripherals {
         None
     }
 
+    /// Number of interrupts of the vector table.
+    fn interrupts(&self) -> u32 {
+        97
+    }
+
+    /// HCLK cycles until a store that has arrived at this address is in force.
+    fn settling(&self, _address: u32) -> u32 {
+        0
+    }
+
     /// The current settings for reads of the flash.
     fn flash_access(&self) -> FlashAccess {
-        FlashAccess { wait_states: 0, caches_code: true, caches_constants: true }
+        FlashAccess { caches_code: true, caches_constants: true, ..FlashAccess::default() }
     }
 
     /// The next instant at which the state changes without an access by the core.

@@ -59,6 +59,11 @@ impl Pwr {
         self.over_drive && self.plain.get(CR) >> 16 & 0b11 == 0b11
     }
 
+    /// Whether ODSWEN is set without ODEN.
+    pub(crate) fn is_switched_alone(&self) -> bool {
+        self.over_drive && self.plain.get(CR) >> 16 & 0b11 == 0b10
+    }
+
     /// Whether the backup SRAM can be written.
     pub(crate) fn backup_is_writable(&self) -> bool {
         bit(self.plain.get(CR), DBP)
@@ -91,6 +96,6 @@ impl Pwr {
     fn ready_bits(&self) -> u32 {
         let control = self.plain.get(CR);
         let on = |n| self.over_drive && bit(control, n);
-        flag(self.keeps_backup(), 3) | flag(true, 14) | flag(on(16), 16) | flag(on(17), 17)
+        flag(self.keeps_backup(), 3) | flag(true, 14) | flag(on(16), 16) | flag(self.over_drives(), 17)
     }
 }

@@ -114,6 +114,7 @@ const RESET_FLAGS: u32 = 0xFE00_0000;
 const PINRSTF: u32 = 1 << 26;
 /// The clock security system: CSSON of RCC_CR, CSSF and CSSC of RCC_CIR.
 const CSSON: u32 = 19;
+const HSEBYP: u32 = 18;
 const CSSF: u32 = 7;
 const CSSC: u32 = 23;
 /// CFGR: HPRE, PPRE1 and PPRE2.
@@ -141,6 +142,8 @@ pub(crate) struct Rcc {
     divided: Option<Time>,
     /// HCLK cycles from the last change of a divider to a switch of the system clock.
     switched: Option<u64>,
+    /// A store has changed HSEBYP while HSE was on.
+    late_bypass: bool,
 }
 
 impl Rcc {
@@ -163,6 +166,7 @@ impl Rcc {
             in_use: 0,
             divided: None,
             switched: None,
+            late_bypass: false,
         };
         rcc.sources[HSI].switch(true, Time::ZERO);
         rcc
@@ -304,8 +308,21 @@ impl Rcc {
         self.switched.take()
     }
 
+    /// Whether a store has changed HSEBYP while HSE was on, since the last call.
+    pub(crate) fn take_late_bypass(&mut self) -> bool {
+        std::mem::take(&mut self.late_bypass)
+    }
+
+    /// Whether HSE is bypassed, while it is on.
+    pub(crate) fn hse_is_bypassed(&self) -> Option<bool> {
+        self.sources[HSE].on.then_some(bit(self.settings, HSEBYP))
+    }
+
     fn write_control(&mut self, value: u32, now: Time) {
-        self.settings = value & 0x000C_00F8;
+        self.late_bypass |= self.sources[HSE].on && bit(self.settings ^ value, HSEBYP);
+        // HSEBYP keeps its value while HSE is on (RM0390, 6.3.1).
+        let kept = if self.sources[HSE].on { 1 << HSEBYP } else { 0 };
+        self.settings = value & 0x000C_00F8 & !kept | self.settings & kept;
         for index in 0..self.sources.len() {
             // Software cannot stop a source in use.
             let on = bit(value, self.sources[index].on_bit) || self.uses(index);

@@ -7,6 +7,8 @@ use std::ops::{Range, RangeInclusive};
 use canbus::Time;
 use thiserror::Error;
 
+use crate::adc::STABILISATION;
+use crate::dma::Stream;
 use crate::register::field;
 use crate::stm32f4::Stm32f4;
 use crate::variant::Variant;
@@ -124,6 +126,66 @@ pub enum Breach {
         /// The name of the peripheral.
         name: &'static str,
     },
+    /// The voltage scale of the core is changed while the PLL is on (RM0390 section 5.4.1, VOS).
+    #[error("the voltage scale is changed while the PLL is on")]
+    VoltageScale,
+    /// The core is switched to over-drive before over-drive is on (RM0390 section 5.1.4, entering over-drive mode).
+    #[error("the core is switched to over-drive without over-drive")]
+    OverDrive,
+    /// HSEBYP is written while HSE is on (RM0390 section 6.3.1).
+    #[error("HSEBYP is changed while HSE is on")]
+    Bypass,
+    /// HSE is set to something else than what the board has at `OSC_IN`.
+    #[error("HSE is switched on for {set}, but the board has {present}")]
+    Oscillator {
+        /// What the program has set.
+        set: &'static str,
+        /// What the board has.
+        present: &'static str,
+    },
+    /// The flash is changed by double words, for which VPP needs 8 to 9 V (RM0390 table 7, PSIZE).
+    #[error("the flash is changed by double words without VPP")]
+    NoVpp,
+    /// A conversion starts before the ADC is stable (DS10693, tSTAB).
+    #[error("a conversion starts {nanoseconds} ns after ADON; the ADC is stable after {least} ns")]
+    Stabilisation {
+        /// The time since ADON.
+        nanoseconds: u64,
+        /// The least time.
+        least: u64,
+    },
+    /// A stream is set up again before its EN reads 0 (RM0390 section 9.3.18).
+    #[error("stream {stream} of DMA{controller} is set up before it has stopped")]
+    DmaStop {
+        /// The controller: 1 or 2.
+        controller: usize,
+        /// The stream: 0 to 7.
+        stream: usize,
+    },
+    /// An address of a stream is no multiple of its width (RM0390 section 9.3.11).
+    #[error("stream {stream} of DMA{controller} has an address that is no multiple of its width")]
+    DmaAddress {
+        /// The controller: 1 or 2.
+        controller: usize,
+        /// The stream: 0 to 7.
+        stream: usize,
+    },
+    /// A line of a cache of the flash is used although the flash has changed (RM0390 section 3.4.2).
+    #[error("the cache of the {what} has a line of the flash at {address:#010x} from before its change")]
+    StaleCache {
+        /// Code or constants.
+        what: &'static str,
+        /// The line.
+        address: u32,
+    },
+    /// VTOR is not aligned to the size of the vector table, rounded up to a power of two (ARMv7-M, B3.2.5).
+    #[error("the vector table at {address:#010x} is not aligned to {least} bytes")]
+    VectorTable {
+        /// VTOR.
+        address: u32,
+        /// The least alignment.
+        least: u32,
+    },
     /// A function that the emulator does not model.
     #[error("{what} is not modelled")]
     NotModelled {
@@ -171,6 +233,11 @@ const ADC_CLOCK: RangeInclusive<u64> = 600_000..=36 * MEGA;
 const SSI_CLOCK: RangeInclusive<u64> = 0..=MEGA;
 /// The least sampling time of the temperature sensor and the internal reference.
 const INTERNAL_SOURCE: Time = Time::from_micros(10);
+/// The switch and the capacitor of the ADC's input (DS10693, ADC characteristics: typical values), and the time constants in
+/// which the capacitor comes to within a quarter of a step: ln(2^14).
+const SWITCH_OHMS: f64 = 6_000.0;
+const SAMPLING_FARAD: f64 = 4e-12;
+const SETTLING: f64 = 9.7;
 /// The range of sample points in CiA 301, table 1, in permille.
 const SAMPLE_POINT: RangeInclusive<u32> = 850..=900;
 
@@ -217,8 +284,27 @@ impl Stm32f4 {
         self.rules.check(states >= least, Breach::WaitStates { hertz, states, least });
     }
 
+    /// Checks the rules after a store to PWR.
+    pub(crate) fn check_regulator(&mut self, before: u32) {
+        let changes = self.pwr.scale() != before;
+        self.rules.check(!(changes && self.rcc.pll().is_some()), Breach::VoltageScale);
+        self.rules.check(!self.pwr.is_switched_alone(), Breach::OverDrive);
+    }
+
+    /// Checks the rules after a store to RCC.
+    pub(crate) fn check_oscillator(&mut self) {
+        self.rules.check(!self.rcc.take_late_bypass(), Breach::Bypass);
+        let Some(is_bypassed) = self.rcc.hse_is_bypassed().filter(|_| self.board.hse.is_some()) else {
+            return;
+        };
+        let name = |is_clock| if is_clock { "a clock" } else { "a crystal" };
+        let (set, present) = (name(is_bypassed), name(self.board.hse_is_clock));
+        self.rules.check(set == present, Breach::Oscillator { set, present });
+    }
+
     /// Checks the supply during an operation of the flash.
     pub(crate) fn check_flash_supply(&mut self, now: Time) {
+        self.rules.check(!self.flash.works_by_double_words(now), Breach::NoVpp);
         let millivolts = (self.plant.supply(now) * 1000.0) as u32;
         let holds = millivolts >= WORD_SUPPLY || !self.flash.works_by_words(now);
         self.rules.check(holds, Breach::FlashSupply { millivolts });
@@ -256,10 +342,18 @@ impl Stm32f4 {
         self.rules.check(SAMPLE_POINT.contains(&permille), Breach::SamplePoint { permille });
     }
 
-    /// Checks the rule after a store to a DMA controller: 0 is DMA1.
-    pub(crate) fn check_flags(&mut self, controller: usize) {
-        if let Some(stream) = self.dmas[controller].take_begun_with_flags() {
-            self.rules.check(false, Breach::DmaFlags { controller: controller + 1, stream });
+    /// Checks the rules after a store to a DMA controller: 0 is DMA1.
+    pub(crate) fn check_streams(&mut self, number: usize) {
+        let controller = number + 1;
+        let dma = &mut self.dmas[number];
+        let flags = dma.take(Stream::take_begun_with_flags);
+        let stop = dma.take(Stream::take_set_up_early);
+        let address = dma.take(Stream::take_odd_address);
+        let flags = flags.map(|stream| Breach::DmaFlags { controller, stream });
+        let stop = stop.map(|stream| Breach::DmaStop { controller, stream });
+        let address = address.map(|stream| Breach::DmaAddress { controller, stream });
+        for breach in [flags, stop, address].into_iter().flatten() {
+            self.rules.check(false, breach);
         }
     }
 
@@ -294,11 +388,10 @@ impl Stm32f4 {
         let clock = self.clocks.hclk / u64::from(self.clocks.apb2_divider * self.adc_common.divider());
         self.check_clock("ADCCLK", clock, &ADC_CLOCK);
         for (channel, sampled) in self.adc.sampling() {
-            if channel == REFERENCE || channel == self.variant.temperature_channel() {
-                let nanoseconds = |time: Time| time.0 * 1000 / Time::PER_MICRO;
-                let (nanoseconds, least) = (nanoseconds(sampled), nanoseconds(INTERNAL_SOURCE));
-                let breach = Breach::SamplingTime { channel, nanoseconds, least };
-                self.rules.check(sampled >= INTERNAL_SOURCE, breach);
+            if let Some(least) = self.least_sampling_time(channel) {
+                let (nanoseconds, needed) = (nanoseconds(sampled), nanoseconds(least));
+                let breach = Breach::SamplingTime { channel, nanoseconds, least: needed };
+                self.rules.check(sampled >= least, breach);
             }
             for (_, index, port, pin) in ANALOGUE.into_iter().filter(|place| place.0 == channel) {
                 let breach = Breach::Pin { port, pin, function: "analogue" };
@@ -306,4 +399,27 @@ impl Stm32f4 {
             }
         }
     }
+
+    /// The least time to sample a channel that the board uses, to half a step of 12 bits (DS10693, equation of the highest
+    /// external impedance).
+    fn least_sampling_time(&self, channel: u32) -> Option<Time> {
+        if channel == REFERENCE || channel == self.variant.temperature_channel() {
+            return Some(INTERNAL_SOURCE);
+        }
+        let ohms = self.board.front_end.source_resistance(channel)?;
+        let seconds = (ohms + SWITCH_OHMS) * SAMPLING_FARAD * SETTLING;
+        Some(Time((seconds * Time::PER_SECOND as f64) as u64))
+    }
+
+    /// Checks the rule before a conversion that begins at an instant.
+    pub(crate) fn check_stability(&mut self) {
+        if let Some(since) = self.adc.take_early_start() {
+            let (nanoseconds, least) = (nanoseconds(since), nanoseconds(STABILISATION));
+            self.rules.check(false, Breach::Stabilisation { nanoseconds, least });
+        }
+    }
+}
+
+fn nanoseconds(time: Time) -> u64 {
+    time.0 * 1000 / Time::PER_MICRO
 }

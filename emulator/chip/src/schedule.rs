@@ -13,6 +13,7 @@ use crate::rules::Breach;
 use crate::spi::Far;
 use crate::stm32f4::Stm32f4;
 use crate::timer::{LSI_CHANNEL, Timer};
+use crate::variant::Variant;
 
 /// Indexes into `TIMERS` and `SPIS`.
 const TIM2: usize = 0;
@@ -46,6 +47,22 @@ impl Peripherals for Stm32f4 {
             0x4000 => Some(self.clocks.divider(Apb::One)),
             0x4001 => Some(self.clocks.divider(Apb::Two)),
             _ => None,
+        }
+    }
+
+    /// RM0390 table 38, RM0090 tables 61 and 62.
+    fn interrupts(&self) -> u32 {
+        if self.variant == Variant::F446 { 97 } else { 82 }
+    }
+
+    /// A clock that is switched on comes two cycles of the AHB later, or one and the divider of the APB (ES0298 and ES0182,
+    /// delay after an RCC peripheral clock enabling).
+    fn settling(&self, address: u32) -> u32 {
+        match address {
+            0x4002_3830..=0x4002_383B => 2,
+            0x4002_3840..=0x4002_3843 => 1 + self.clocks.divider(Apb::One),
+            0x4002_3844..=0x4002_3847 => 1 + self.clocks.divider(Apb::Two),
+            _ => 0,
         }
     }
 

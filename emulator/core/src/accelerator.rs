@@ -11,18 +11,53 @@ const LINE: u32 = 16;
 pub(crate) struct Accelerator {
     code: Lines,
     constants: Lines,
+    /// How often the program had emptied each cache.
+    resets: [u32; 2],
+    /// A line that was used although the flash has changed: of what, and its address.
+    stale: Option<(&'static str, u32)>,
 }
 
 /// The numbers of the lines in a cache, the most recently used last.
 #[derive(Clone, Debug)]
 struct Lines {
     held: Vec<u32>,
+    /// Lines among them that the flash has no longer.
+    stale: Vec<u32>,
     room: usize,
 }
 
 impl Accelerator {
     pub(crate) fn new() -> Accelerator {
-        Accelerator { code: Lines::new(64), constants: Lines::new(8) }
+        Accelerator { code: Lines::new(64), constants: Lines::new(8), resets: [0; 2], stale: None }
+    }
+
+    /// The flash has changed: the caches keep what they have.
+    pub(crate) fn change(&mut self, address: u32, size: u32) {
+        let changed = address / LINE..=(address + size.max(1) - 1) / LINE;
+        for lines in [&mut self.code, &mut self.constants] {
+            let stale: Vec<u32> = lines.held.iter().copied().filter(|line| changed.contains(line)).collect();
+            lines.stale.extend(stale);
+        }
+    }
+
+    /// Takes a line that was used although the flash has changed.
+    pub(crate) fn take_stale(&mut self) -> Option<(&'static str, u32)> {
+        self.stale.take()
+    }
+
+    /// Empties the caches that the program has emptied since the last access.
+    fn follow(&mut self, flash: FlashAccess) {
+        let resets = [flash.code_resets, flash.constant_resets];
+        if resets != self.resets {
+            for ((lines, new), old) in
+                [&mut self.code, &mut self.constants].into_iter().zip(resets).zip(self.resets)
+            {
+                if new != old {
+                    *lines = Lines::new(lines.room);
+                }
+            }
+            self.resets = resets;
+        }
     }
 
     /// Empties both caches (a reset).
@@ -33,16 +68,23 @@ impl Accelerator {
     /// The wait cycles of a code fetch, counted as if the core did nothing else during the wait. After a jump, a
     /// prefetch of another line may have to end first.
     pub(crate) fn fetch(&mut self, address: u32, size: u32, in_a_row: bool, flash: FlashAccess) -> u32 {
+        self.follow(flash);
         let (first, last) = (address / LINE, (address + size.max(1) - 1) / LINE);
+        let stale = (first..=last).find(|line| flash.caches_code && self.code.stale.contains(line));
+        self.stale = stale.map(|line| ("code", line * LINE)).or(self.stale);
         (first..=last)
-            .filter(|&line| !self.code.touch(line) || !flash.caches_code)
+            .filter(|&line| !flash.caches_code || !self.code.touch(line))
             .map(|line| if line == first && !in_a_row { after_another(flash) } else { read(flash) })
             .sum()
     }
 
     /// The wait cycles of a constant; the read of a line of code may have to end first.
     pub(crate) fn load(&mut self, address: u32, flash: FlashAccess) -> u32 {
-        let hit = self.constants.touch(address / LINE) && flash.caches_constants;
+        self.follow(flash);
+        let line = address / LINE;
+        let stale = flash.caches_constants && self.constants.stale.contains(&line);
+        self.stale = stale.then_some(("constants", line * LINE)).or(self.stale);
+        let hit = flash.caches_constants && self.constants.touch(line);
         if hit { 0 } else { after_another(flash) }
     }
 }
@@ -59,7 +101,7 @@ fn after_another(flash: FlashAccess) -> u32 {
 
 impl Lines {
     fn new(room: usize) -> Lines {
-        Lines { held: Vec::with_capacity(room), room }
+        Lines { held: Vec::with_capacity(room), stale: Vec::new(), room }
     }
 
     /// Marks the line as used and cached; returns whether it was already in the cache.
@@ -67,7 +109,10 @@ impl Lines {
         let place = self.held.iter().rposition(|&held| held == line);
         match place {
             Some(place) => drop(self.held.remove(place)),
-            None if self.held.len() == self.room => drop(self.held.remove(0)),
+            None if self.held.len() == self.room => {
+                let old = self.held.remove(0);
+                self.stale.retain(|&line| line != old);
+            }
             None => {}
         }
         self.held.push(line);
@@ -79,7 +124,32 @@ impl Lines {
 mod tests {
     use super::*;
 
-    const FLASH: FlashAccess = FlashAccess { wait_states: 4, caches_code: true, caches_constants: true };
+    const FLASH: FlashAccess = FlashAccess {
+        wait_states: 4,
+        caches_code: true,
+        caches_constants: true,
+        code_resets: 0,
+        constant_resets: 0,
+    };
+
+    #[test]
+    fn a_line_from_before_a_change_is_told_until_the_cache_is_emptied() {
+        let mut accelerator = Accelerator::new();
+        accelerator.load(0x104, FLASH);
+        accelerator.fetch(0x100, 4, true, FLASH);
+        accelerator.change(0x108, 4);
+        accelerator.load(0x100, FLASH);
+        assert_eq!(accelerator.take_stale(), Some(("constants", 0x100)));
+        accelerator.fetch(0x100, 4, true, FLASH);
+        assert_eq!(accelerator.take_stale(), Some(("code", 0x100)));
+        let emptied = FlashAccess { constant_resets: 1, ..FLASH };
+        assert_eq!((accelerator.load(0x100, emptied), accelerator.take_stale()), (9, None));
+        accelerator.fetch(0x100, 4, true, emptied);
+        assert!(accelerator.take_stale().is_some(), "the other cache was not emptied");
+        accelerator.change(0x200, 4);
+        accelerator.load(0x200, emptied);
+        assert_eq!(accelerator.take_stale(), None, "it was not in the cache");
+    }
 
     #[test]
     fn a_loop_that_fits_waits_once_and_one_that_does_not_always() {

@@ -134,6 +134,9 @@ pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address
 fn allows<P>(core: &mut Core<P>, uses: u16) -> bool {
     core.exclusive |= uses & EXCLUSIVE != 0;
     core.wrote_basepri |= uses & BASEPRI != 0;
+    if uses & FLOATS != 0 {
+        core.scb.end_lazy();
+    }
     uses & FLOATS == 0 || core.scb.allows_floats()
 }
 

@@ -1,7 +1,7 @@
 //! Exception entry and return: the frames on the stack (ARMv7-M, B1.5.6 to B1.5.8).
 
 use chip::Peripherals;
-use unicorn_engine::RegisterARM;
+use unicorn_engine::{Prot, RegisterARM};
 
 use crate::clock;
 use crate::engine;
@@ -11,6 +11,7 @@ use crate::fault::Fault;
 use crate::it_block;
 use crate::machine::Machine;
 use crate::mechanism::Mechanism;
+use crate::scb::cfsr;
 
 /// The integer registers of a frame, in the order of the frame.
 const INTEGER: [RegisterARM; 6] =
@@ -64,7 +65,14 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.set(RegisterARM::FPSCR, 0);
         self.set(RegisterARM::SP, stack & !3);
         self.set(RegisterARM::LR, 0xFFFF_FFFF);
-        self.set(RegisterARM::PC, entry & !1);
+        self.jump(entry);
+    }
+
+    /// Goes on at a vector. One without its lowest bit leaves the Thumb state, in which no instruction runs (ARMv7-M,
+    /// B1.5.3).
+    fn jump(&mut self, vector: u32) {
+        self.set(RegisterARM::PC, vector & !1);
+        self.lost_thumb = vector & 1 == 0;
     }
 
     /// Takes an exception.
@@ -109,7 +117,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.set(RegisterARM::LR, exc_return);
         self.cpu.get_data_mut().ahead = handler.unwrap_or(0) & !1;
         match handler {
-            Some(handler) => self.set(RegisterARM::PC, handler & !1),
+            Some(handler) => self.jump(handler),
             None => self.lock_up(base),
         }
     }
@@ -119,7 +127,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         let control = self.register(RegisterARM::CONTROL);
         let xpsr = self.register(RegisterARM::XPSR);
         let handler = xpsr & 0x1FF != 0;
-        let floats = control & FPCA != 0 && !self.cpu.get_data().lacks(Mechanism::FloatFrame);
+        let core = self.cpu.get_data();
+        let floats = control & FPCA != 0 && core.scb.stacks_floats() && !core.lacks(Mechanism::FloatFrame);
         let words = if floats { EXTENDED } else { BASIC };
         let stack = self.register(RegisterARM::SP);
         let padded = if stack & 4 != 0 { ALIGNED } else { 0 };
@@ -131,10 +140,14 @@ impl<P: Peripherals + 'static> Machine<P> {
         exc_return |= if floats { 0 } else { NO_FLOATS };
         exc_return |= if handler { 0 } else { TO_THREAD };
         exc_return |= if process { TO_PROCESS } else { 0 };
-        (result.map_err(|()| Fault::stacking(pc)), exc_return)
+        if floats {
+            self.cpu.get_data_mut().scb.begin_lazy(top + 4 * BASIC);
+        }
+        (result.map_err(|status| Fault::stacking(pc, status)), exc_return)
     }
 
-    fn write_frame(&mut self, top: u32, pc: u32, xpsr: u32, floats: bool) -> Result<(), ()> {
+    /// The error is the status of the fault.
+    fn write_frame(&mut self, top: u32, pc: u32, xpsr: u32, floats: bool) -> Result<(), u32> {
         let mut words: Vec<u32> = INTEGER.iter().map(|register| self.register(*register)).collect();
         words.extend([pc, xpsr]);
         if floats {
@@ -143,9 +156,14 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         if !self.model().ram.contains(&top) {
-            return Err(());
+            return Err(cfsr::STKERR);
         }
-        self.cpu.get_data_mut().memory.write(top, &bytes).ok_or(())
+        let core = self.cpu.get_data_mut();
+        let ends = [top, top + bytes.len() as u32 - 1];
+        if !ends.iter().all(|&end| core.scb.mpu.data_rights(end).0 & Prot::WRITE.0 != 0) {
+            return Err(cfsr::MSTKERR);
+        }
+        core.memory.write(top, &bytes).ok_or(cfsr::STKERR)
     }
 
     /// Ends the active exception, after the core has branched to an EXC_RETURN value.
@@ -223,6 +241,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             self.set(*register, *word);
         }
         if floats {
+            self.cpu.get_data_mut().scb.end_lazy();
             (0..16).for_each(|n| self.set_float(n, words[8 + n as usize]));
             self.set(RegisterARM::FPSCR, words[24]);
         }

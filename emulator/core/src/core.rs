@@ -1,7 +1,7 @@
 //! The state that the hooks of the CPU library share with the run loop: clock, interrupt controller, system
 //! registers, and the chip behind them.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use canbus::Time;
 use chip::{Breach, Effect, Peripherals};
@@ -15,6 +15,7 @@ use crate::mechanism::Mechanism;
 use crate::memory::Memory as Bytes;
 use crate::model::Model;
 use crate::nvic::{Masks, Nvic};
+use crate::posted::Posted;
 use crate::profile::Profile;
 use crate::scb::Scb;
 use crate::seed::Bugs;
@@ -74,16 +75,22 @@ pub(crate) struct Core<P> {
     pub(crate) profile: Profile,
     /// The mode in which interrupts come between any two instructions.
     pub(crate) stepping: Option<Stepping>,
+    /// Stores of the program on their way to a peripheral.
+    pub(crate) posted: Posted,
     /// Bugs that a test has seeded into the program.
     pub(crate) bugs: Bugs,
     /// Points before which the program stops.
     pub(crate) watch: Option<Watch>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
+    /// The page of a data access that the memory protection unit forbids.
+    pub(crate) denied: Option<u32>,
     /// The address of a buffered store that failed: the fault is taken before the next block.
     pub(crate) lost_store: Option<u32>,
     /// Broken rules, each with its instant and the address of the code.
     pub(crate) breaches: VecDeque<(Time, u32, Breach)>,
+    /// All of them so far: each is reported once.
+    told: BTreeSet<Breach>,
     /// The address of the last counted code.
     pub(crate) place: u32,
     pub(crate) effects: VecDeque<Effect>,
@@ -106,7 +113,7 @@ pub(crate) struct Core<P> {
     pub(crate) flash_closed: bool,
     /// Number of writes to the flash array.
     pub(crate) flash_changes: u64,
-    cyccnt: Option<Cyccnt>,
+    cyccnt: Cyccnt,
 }
 
 /// The part of a [`crate::Moment`] that this structure holds.
@@ -120,15 +127,17 @@ pub(crate) struct CoreMoment<P> {
     effects: VecDeque<Effect>,
     pended: [Time; Exception::COUNT],
     flags: [bool; 2],
-    cyccnt: Option<Cyccnt>,
+    cyccnt: Cyccnt,
     ahead: u32,
+    posted: Posted,
 }
 
 /// DWT_CYCCNT: its value at some instant, and whether it runs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Cyccnt {
     at: Time,
     value: u32,
+    runs: bool,
 }
 
 impl<P: Peripherals> Core<P> {
@@ -148,12 +157,15 @@ impl<P: Peripherals> Core<P> {
             stats: Stats::default(),
             profile: Profile::default(),
             stepping: None,
+            posted: Posted::default(),
             bugs: Bugs::default(),
             watch: None,
             halt: None,
             unmapped: None,
+            denied: None,
             lost_store: None,
             breaches: VecDeque::new(),
+            told: BTreeSet::new(),
             place: 0,
             effects: VecDeque::new(),
             pended: [Time::ZERO; Exception::COUNT],
@@ -167,7 +179,7 @@ impl<P: Peripherals> Core<P> {
             without: None,
             flash_closed: false,
             flash_changes: 0,
-            cyccnt: None,
+            cyccnt: Cyccnt::default(),
         }
     }
 
@@ -188,6 +200,7 @@ impl<P: Peripherals> Core<P> {
             flags: [self.reset_requested, self.exclusive],
             cyccnt: self.cyccnt,
             ahead: self.ahead,
+            posted: self.posted.clone(),
         }
     }
 
@@ -207,6 +220,7 @@ impl<P: Peripherals> Core<P> {
         [self.reset_requested, self.exclusive] = moment.flags;
         self.cyccnt = moment.cyccnt;
         self.ahead = moment.ahead;
+        self.posted.clone_from(&moment.posted);
         self.halt = None;
         self.unmapped = None;
         self.lost_store = None;
@@ -217,12 +231,13 @@ impl<P: Peripherals> Core<P> {
         self.nvic = Nvic::default();
         self.scb = Scb::default();
         self.systick = SysTick::default();
+        self.posted = Posted::default();
         self.stats.unwound(self.now);
         self.halt = None;
         self.unmapped = None;
         self.lost_store = None;
         self.reset_requested = false;
-        self.cyccnt = None;
+        self.cyccnt = Cyccnt::default();
         self.cycle = Time::of_cycle(16_000_000);
         self.accelerator.iter_mut().for_each(Accelerator::clear);
     }
@@ -249,7 +264,7 @@ impl<P: Peripherals> Core<P> {
 
     /// The next instant at which the state changes without the program.
     pub(crate) fn deadline(&self) -> Time {
-        self.chip.deadline().min(self.systick.deadline())
+        self.chip.deadline().min(self.systick.deadline()).min(self.posted.deadline())
     }
 
     /// Whether the run loop has something to do before the next block runs.
@@ -258,6 +273,15 @@ impl<P: Peripherals> Core<P> {
             || self.reset_requested
             || !self.effects.is_empty()
             || self.lost_store.is_some()
+    }
+
+    /// Whether nothing has come since the core began to sleep with these exceptions pending.
+    pub(crate) fn is_as_it_slept(&self, pending: u128) -> bool {
+        self.nvic.pending_set() == pending
+            && self.nvic.has_seen(self.chip.lines())
+            && self.effects.is_empty()
+            && !self.reset_requested
+            && self.lost_store.is_none()
     }
 
     /// Whether the next block may run without further checks. `false` does not mean that the block must stop.
@@ -285,6 +309,7 @@ impl<P: Peripherals> Core<P> {
 
     /// Processes everything that is due, and samples the interrupt lines.
     pub(crate) fn advance(&mut self) {
+        self.deliver();
         if self.chip.deadline() <= self.now {
             self.chip.advance(self.now, &self.memory);
         }
@@ -305,13 +330,26 @@ impl<P: Peripherals> Core<P> {
         let before = self.nvic.pending_set();
         self.nvic.sample(self.chip.lines());
         self.stamp(self.nvic.pending_set() & !before);
+        self.due_is_new();
+    }
+
+    /// Computes the next deadline anew.
+    pub(crate) fn due_is_new(&mut self) {
         self.due = self.deadline();
         self.look_again();
     }
 
-    /// Records a broken rule with the current time and address.
+    /// The last store into the flash array that is still to be carried out.
+    pub(crate) fn programmed(&self) -> Option<Effect> {
+        let is_one = |effect: &&Effect| matches!(effect, Effect::Store { address, .. } if *address < RAM);
+        self.effects.iter().rfind(is_one).cloned()
+    }
+
+    /// Records a broken rule with the current time and address, once.
     pub(crate) fn report(&mut self, breach: Breach) {
-        self.breaches.push_back((self.now, self.place, breach));
+        if self.told.insert(breach) {
+            self.breaches.push_back((self.now, self.place, breach));
+        }
     }
 
     pub(crate) fn pend(&mut self, exception: Exception) {
@@ -356,9 +394,18 @@ impl<P: Peripherals> Core<P> {
     fn flash_cycles(&mut self, address: u32, size: u32, in_a_row: bool) -> u32 {
         match &mut self.accelerator {
             Some(accelerator) if address < RAM => {
-                accelerator.fetch(address, size, in_a_row, self.chip.flash_access())
+                let cycles = accelerator.fetch(address, size, in_a_row, self.chip.flash_access());
+                self.tell_stale_lines();
+                cycles
             }
             _ => 0,
+        }
+    }
+
+    /// Reports that a cache has given what the flash no longer has.
+    fn tell_stale_lines(&mut self) {
+        if let Some((what, address)) = self.accelerator.as_mut().and_then(Accelerator::take_stale) {
+            self.report(Breach::StaleCache { what, address });
         }
     }
 
@@ -366,6 +413,7 @@ impl<P: Peripherals> Core<P> {
     pub(crate) fn wait_for_constant(&mut self, address: u32) {
         if let Some(accelerator) = &mut self.accelerator {
             let cycles = accelerator.load(address, self.chip.flash_access());
+            self.tell_stale_lines();
             self.spend(0, cycles);
         }
     }
@@ -387,21 +435,20 @@ impl<P: Peripherals> Core<P> {
         let count = self.cyccnt();
         self.cycle = Time::of_cycle(hertz.max(1));
         self.systick.change_clock(self.now, self.cycle);
-        self.due = self.deadline();
-        self.look_again();
+        self.due_is_new();
         self.set_cyccnt(self.cyccnt_runs(), count);
     }
 
     pub(crate) fn cyccnt(&self) -> u32 {
-        self.cyccnt
-            .map_or(0, |count| count.value.wrapping_add((self.now.since(count.at).0 / self.cycle.0) as u32))
+        let Cyccnt { at, value, runs } = self.cyccnt;
+        if runs { value.wrapping_add((self.now.since(at).0 / self.cycle.0) as u32) } else { value }
     }
 
     pub(crate) fn cyccnt_runs(&self) -> bool {
-        self.cyccnt.is_some()
+        self.cyccnt.runs
     }
 
     pub(crate) fn set_cyccnt(&mut self, runs: bool, value: u32) {
-        self.cyccnt = runs.then_some(Cyccnt { at: self.now, value });
+        self.cyccnt = Cyccnt { at: self.now, value, runs };
     }
 }

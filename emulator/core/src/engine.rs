@@ -10,7 +10,7 @@ use crate::clock::{self, Library};
 use crate::core::{Core, Halt, Unmapped};
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
-use crate::{alignment, ppb, stepping};
+use crate::{alignment, posted, ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
@@ -23,6 +23,9 @@ const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
 /// The first address above flash.
 pub(crate) const RAM: u32 = 0x2000_0000;
+
+/// The bus of the flash controller's registers.
+const FLASH_CONTROLLER: u32 = 0x4002_3C00;
 
 /// YIELD and WFE.
 const HINTS: [u16; 2] = [0xBF10, 0xBF20];
@@ -98,6 +101,9 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
             stepping.wait()
         });
         core.spend(0, wait);
+        if posted::is_barrier(&code) {
+            core.wait_at_barrier(place);
+        }
     }
 }
 
@@ -201,20 +207,15 @@ fn on_flash_write<P: Peripherals>(
     let _ = cpu.mem_read(address, old);
     let new = &value.to_le_bytes()[..size];
     let core = cpu.get_data_mut();
+    // The flash controller has got all that the program has told it before.
+    core.wait_for_stores(FLASH_CONTROLLER);
     let result = core.chip.program(address as u32, old, new, core.now);
-    finish(core, address as u32, result.ok());
-    true
-}
-
-/// Ends a store into the chip or the system space: handles effects and interrupts, or a fault when no register
-/// answered.
-fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) {
-    match answer {
-        None if core.scb.buffers(address) => core.lost_store = Some(address),
-        None => core.stop_for(Halt::DataFault(address)),
-        Some(()) => {}
+    core.finish_store(address as u32, result.ok());
+    // The next store of the same block sees what this one has programmed; the rest of the effect comes after the block.
+    if let Some(Effect::Store { address, bytes }) = core.programmed() {
+        let _ = core.memory.write(address, &bytes);
     }
-    core.settle();
+    true
 }
 
 /// Ends a load from the chip. A load seldom changes anything.
@@ -231,7 +232,10 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
     let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
         let core = cpu.get_data_mut();
         let address = base + offset as u32;
-        core.wait_for_bus(address, true);
+        if !core.bugs.ignores_order(address) {
+            core.wait_for_stores(address);
+            core.wait_for_bus(address, true);
+        }
         let value = core.chip.read(address, size as u8, core.now);
         finish_load(core, address, value.is_ok());
         u64::from(core.bugs.seen(address, value.unwrap_or(0)))
@@ -240,9 +244,7 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
         let core = cpu.get_data_mut();
         let address = base + offset as u32;
         let Some(value) = core.bugs.stored(address, size, value as u32) else { return };
-        core.wait_for_bus(address, false);
-        let result = core.chip.write(address, size as u8, value, core.now);
-        finish(core, address, result.ok());
+        core.send(address, size, value);
     };
     cpu.mmio_map(base.into(), size.into(), Some(read), Some(write))?;
     Ok(())
@@ -254,6 +256,7 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
     let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize| {
         let (address, bit) = target(offset);
         let core = cpu.get_data_mut();
+        core.wait_for_stores(address);
         core.wait_for_bus(address, true);
         let value = core.chip.read(address, 4, core.now);
         finish_load(core, address, value.is_ok());
@@ -262,12 +265,13 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
     let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize, value: u64| {
         let (address, bit) = target(offset);
         let core = cpu.get_data_mut();
+        core.wait_for_stores(address);
         core.wait_for_bus(address, true);
         let old = core.chip.read(address, 4, core.now);
-        let new = old.map(|old| old & !(1 << bit) | (value as u32 & 1) << bit);
-        let Some(new) = new.map(|new| core.bugs.stored(address, 4, new)).transpose() else { return };
-        let result = new.and_then(|new| core.chip.write(address, 4, new, core.now));
-        finish(core, address, result.ok());
+        let Ok(old) = old else { return core.finish_store(address, None) };
+        let new = old & !(1 << bit) | (value as u32 & 1) << bit;
+        let Some(new) = core.bugs.stored(address, 4, new) else { return };
+        core.send(address, 4, new);
     };
     cpu.mmio_map(alias.into(), 0x0200_0000, Some(read), Some(write))?;
     Ok(())
@@ -280,11 +284,12 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
         let refused = is_unprivileged(cpu, ipsr);
         let core = cpu.get_data_mut();
         if refused {
-            finish(core, address, None);
+            core.finish_store(address, None);
             return 0;
         }
+        core.deliver();
         let word = core.ppb_read(address & !3, ipsr);
-        finish(core, address, word.map(|_| ()));
+        core.finish_store(address, word.map(|_| ()));
         let value = word.unwrap_or(0) >> (8 * (address & 3));
         u64::from(if size < 4 { value & ((1 << (8 * size)) - 1) } else { value })
     };
@@ -293,12 +298,18 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
         let refused = is_unprivileged(cpu, ipsr(cpu));
         let core = cpu.get_data_mut();
         if refused {
-            return finish(core, address, None);
+            return core.finish_store(address, None);
         }
         let Some(value) = core.bugs.stored(address, size, value as u32) else { return };
-        let word = if size == 4 { Some(value) } else { merged(core, address, size, value) };
+        core.deliver();
+        let word = match address & !3 {
+            // Bits that are written as 1 are cleared: the other bytes are not written.
+            ppb::CFSR => Some(value << (8 * (address & 3))),
+            _ if size == 4 => Some(value),
+            _ => merged(core, address, size, value),
+        };
         let result = word.and_then(|word| core.ppb_write(address & !3, word));
-        finish(core, address, result);
+        core.finish_store(address, result);
         if (ppb::MPU..=ppb::MPU_END).contains(&(address & !3)) {
             // The rights of pages must be queried again, and translated code is dropped before the next block.
             core.memory.protection_is_new = true;
@@ -335,8 +346,15 @@ fn on_page<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType)
     }
     let core = cpu.get_data_mut();
     let address = page as u32;
+    let data = core.scb.mpu.data_rights(address);
+    let is_denied = match kind {
+        MemType::FETCH => false,
+        MemType::WRITE => data.0 & Prot::WRITE.0 == 0,
+        _ => data.0 & Prot::READ.0 == 0,
+    };
+    core.denied = is_denied.then_some(address).or(core.denied);
     if !core.scb.mpu.allows_code(address) && !core.lacks(Mechanism::ExecuteNever) {
-        return Some(TlbEntry { paddr: page, perms: Prot::READ | Prot::WRITE });
+        return Some(TlbEntry { paddr: page, perms: data });
     }
     let memory = &mut core.memory;
     let has_code = !memory.ram.range.contains(&address) || memory.code_in_ram.contains(&address);
@@ -344,7 +362,7 @@ fn on_page<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType)
     if fetched && !has_code {
         memory.code_in_ram.push(address);
     }
-    let perms = if has_code || fetched { Prot::ALL } else { Prot::READ | Prot::WRITE };
+    let perms = if has_code || fetched { data | Prot::EXEC } else { data };
     Some(TlbEntry { paddr: page, perms })
 }
 
@@ -433,9 +451,13 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
 
 /// Carries out an effect on memory; returns any other effect.
 pub(crate) fn apply<P: Peripherals>(cpu: &mut Cpu<P>, effect: Effect) -> Result<Option<Effect>, Error> {
-    match effect {
-        Effect::Store { address, bytes } => store(cpu, address, &bytes).map(|()| None),
-        Effect::Fill { range, byte } => store(cpu, range.start, &vec![byte; range.len()]).map(|()| None),
-        other => Ok(Some(other)),
+    let (address, bytes) = match effect {
+        Effect::Store { address, bytes } => (address, bytes),
+        Effect::Fill { range, byte } => (range.start, vec![byte; range.len()]),
+        other => return Ok(Some(other)),
+    };
+    if let Some(accelerator) = cpu.get_data_mut().accelerator.as_mut().filter(|_| address < RAM) {
+        accelerator.change(address, bytes.len() as u32);
     }
+    store(cpu, address, &bytes).map(|()| None)
 }

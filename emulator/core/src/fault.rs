@@ -48,6 +48,11 @@ impl Fault {
         Fault::new(pc, cfsr::IACCVIOL)
     }
 
+    /// The memory protection unit forbids the data access.
+    pub(crate) fn protection(pc: u32, address: u32) -> Fault {
+        Fault { address: Some(address), ..Fault::new(pc, cfsr::DACCVIOL) }
+    }
+
     /// A usage fault with these status bits.
     pub(crate) fn usage(pc: u32, status: u32) -> Fault {
         Fault::new(pc, status)
@@ -62,8 +67,8 @@ impl Fault {
         Fault::new(pc, cfsr::UNDEFINSTR)
     }
 
-    pub(crate) fn stacking(pc: u32) -> Fault {
-        Fault::new(pc, cfsr::STKERR)
+    pub(crate) fn stacking(pc: u32, status: u32) -> Fault {
+        Fault::new(pc, status)
     }
 
     pub(crate) fn unstacking(stack: u32) -> Fault {
@@ -106,6 +111,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         let scb = &mut self.cpu.get_data_mut().scb;
         match fault.address {
             Some(address) if fault.status == cfsr::PRECISERR => scb.note_data_fault(address),
+            Some(address) if fault.status == cfsr::DACCVIOL => scb.note_protection_fault(address),
             _ if fault.escalated => scb.note_escalation(),
             _ if fault.status == 0 => scb.note_breakpoint(),
             _ => scb.cfsr |= fault.status,

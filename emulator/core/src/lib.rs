@@ -12,7 +12,7 @@
 //! | `core` | the state that hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `mpu`, `ppb` | the registers of the core |
-//! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; faults found only there |
+//! | `stepping`, `alignment`, `posted` | the mode in which interrupts come between any two instructions; faults found only there, stores on their way |
 //! | `watch` | stopping before an instruction, skipping it, flipping a bit of a register, going back |
 //! | `cost`, `floats`, `estimate`, `accelerator` | cycles: of a block, of the floating-point unit, their range, of the flash |
 //! | `stats`, `profile` | the counters, and the counts of each block |
@@ -22,20 +22,21 @@
 //!
 //! * Interrupts are taken between blocks of code, not between instructions: up to a few dozen cycles late. After
 //!   [`Machine::interleave`] they are taken between any two instructions.
-//! * Floating-point registers are stacked at exception entry, never lazily; a higher interrupt that arrives within the
+//! * Floating-point registers are stacked at exception entry, never lazily, though FPCCR and FPCAR show it so; a higher interrupt that arrives within the
 //!   twelve cycles of an entry nests instead of going first.
 //! * A refused load from a peripheral is a precise bus fault with the right address, but with the program counter of
 //!   the next block. A load from unmapped memory has the exact program counter. A refused store is an imprecise fault
 //!   at the next block.
 //! * Flash becomes busy at the end of the block that has stored to it. A load from busy flash in an IT block is
 //!   repeated from the start of the block.
-//! * The MPU only controls where code runs, page by page of a kilobyte, in fault handlers too; a region that protects
-//!   data is refused.
+//! * The MPU works page by page of a kilobyte, with the rights of privileged code, in fault handlers too. A region that asks
+//!   for more is reported.
 //! * WFE is a hint that never sleeps; there is no bit-band alias of RAM and no alias of flash at address 0.
 //! * Where CPACR does not allow the floating-point unit, the fault comes at the start of the block that uses it.
 //! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and the accesses and divisions that CCR traps, fault only after
 //!   [`Machine::interleave`], and not in an IT block. Without that mode a program that sets the traps is reported
 //!   ([`chip::Breach`]).
+//! * A store reaches its peripheral at once, and some cycles later only after [`Machine::interleave`].
 //! * Cycle counts have a range ([`Estimate`]): the pipeline and the contention for the buses are not modelled.
 
 mod accelerator;
@@ -58,6 +59,7 @@ mod memory;
 mod model;
 mod mpu;
 mod nvic;
+mod posted;
 mod power_up;
 mod ppb;
 mod profile;

@@ -1,9 +1,10 @@
 //! The machine: a core with its memory and a chip around it, run in virtual time.
 
 use canbus::Time;
-use chip::{BusFault, Effect, Peripherals};
+use chip::{Breach, BusFault, Effect, Peripherals};
 use unicorn_engine::{RegisterARM, UcHookId, uc_error};
 
+use crate::alignment;
 use crate::clock;
 use crate::context::THUMB;
 use crate::core::{Core, Halt};
@@ -17,7 +18,7 @@ use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::power_up::PowerUp;
 use crate::profile::Visits;
-use crate::scb::cfsr;
+use crate::scb::{SLEEPDEEP, cfsr};
 use crate::stats::Stats;
 use crate::stepping::{self, Stepping};
 
@@ -52,8 +53,12 @@ pub struct Machine<P: Peripherals + 'static> {
     powered: bool,
     power_ons: u64,
     sleeping: bool,
+    /// The pending exceptions with which the core last slept on.
+    resting: Option<u128>,
     locked: Option<u32>,
     stall: Time,
+    /// The core has left the Thumb state by a vector.
+    pub(crate) lost_thumb: bool,
     /// A load waits for flash; the core does nothing else until the load ends.
     loading: bool,
     incidents: Vec<(Time, Incident)>,
@@ -84,8 +89,10 @@ impl<P: Peripherals + 'static> Machine<P> {
             powered: false,
             power_ons: 0,
             sleeping: false,
+            resting: None,
             locked: None,
             stall: Time::ZERO,
+            lost_thumb: false,
             loading: false,
             incidents: vec![],
             watching: None,
@@ -250,7 +257,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     }
 
     /// Lets interrupts come between any two instructions and advances time with each instruction, from now on, also
-    /// after resets. With a seed some instructions take a few cycles longer, so that each seed gives another
+    /// after resets, and stores arrive at peripherals some cycles later. With a seed some instructions take a few cycles longer, so that each seed gives another
     /// interleaving. The mode is several times slower than the usual mode, which checks between blocks of code only.
     ///
     /// # Errors
@@ -278,6 +285,14 @@ impl<P: Peripherals + 'static> Machine<P> {
     pub fn interrupt_before(&mut self, address: u32, exception: Exception) {
         if let Some(stepping) = &mut self.cpu.get_data_mut().stepping {
             stepping.interrupt_before(address, exception);
+        }
+    }
+
+    /// Takes the barrier (DSB or DMB) at an address out: it waits for no store. Has no effect unless
+    /// [`Machine::interleave`] was called.
+    pub fn omit_barrier(&mut self, address: u32) {
+        if let Some(stepping) = &mut self.cpu.get_data_mut().stepping {
+            stepping.omit(address);
         }
     }
 
@@ -309,16 +324,39 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// The next instant at which the state changes without an outside event: now, unless the core sleeps.
     pub fn next_event(&self) -> Time {
         let core = self.cpu.get_data();
-        match (self.powered, self.sleeping || self.locked.is_some()) {
+        match (self.powered, self.rests()) {
             (false, _) => Time::NEVER,
             (true, true) => core.deadline().max(core.now),
             (true, false) => core.now,
         }
     }
 
+    /// Has the machine look at everything again before it sleeps on, after a change that no other method has made.
+    pub fn stir(&mut self) {
+        self.resting = None;
+    }
+
+    /// Whether the core sleeps, and nothing has come that could wake it.
+    fn rests(&self) -> bool {
+        let core = self.cpu.get_data();
+        self.resting.is_some_and(|pending| core.is_as_it_slept(pending))
+    }
+
+    /// Lets a resting core sleep on; `false` when the core or the chip has something to do until then.
+    fn sleeps_on(&mut self, until: Time) -> bool {
+        let sleeps_on = self.powered && until < self.next_event() && self.rests();
+        if sleeps_on {
+            self.sleep_to(until);
+        }
+        sleeps_on
+    }
+
     /// Runs to `until`, or until an earlier reason to stop.
     pub fn run_until(&mut self, until: Time) -> Stop {
         self.cpu.get_data_mut().until = until;
+        if self.sleeps_on(until) {
+            return self.reached();
+        }
         loop {
             if !self.powered {
                 let core = self.cpu.get_data_mut();
@@ -332,13 +370,17 @@ impl<P: Peripherals + 'static> Machine<P> {
                 return Stop::Reset;
             }
             if self.now() >= until {
-                return self.locked.map_or(Stop::Reached, |pc| Stop::Lockup { pc });
+                return self.reached();
             }
             self.step(until);
             if std::mem::take(&mut self.at_point) {
                 return Stop::Watched;
             }
         }
+    }
+
+    fn reached(&self) -> Stop {
+        self.locked.map_or(Stop::Reached, |pc| Stop::Lockup { pc })
     }
 
     /// Has [`Machine::run_until`] come back after each reset, before the first instruction, from now on or no longer.
@@ -360,6 +402,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     pub(crate) fn set_state(&mut self, state: (bool, Option<u32>, Time, bool)) {
         (self.sleeping, self.locked, self.stall, self.loading) = state;
+        self.resting = None;
         self.was_reset = false;
         self.powered = true;
     }
@@ -405,6 +448,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// One step of the core: an exception, a sleep, or code.
     fn step(&mut self, until: Time) {
         let masks = clock::masks(&self.cpu);
+        self.resting = None;
         if self.loading && self.now() < self.stall {
             return self.wait_for_flash(until);
         }
@@ -429,6 +473,9 @@ impl<P: Peripherals + 'static> Machine<P> {
         if self.stalls() {
             return self.wait_for_flash(until);
         }
+        if std::mem::take(&mut self.lost_thumb) {
+            return self.take_fault(Fault::usage(self.pc(), cfsr::INVSTATE));
+        }
         self.run_code();
     }
 
@@ -444,9 +491,14 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// Lets the core sleep until the next event.
     fn idle(&mut self, until: Time) {
-        let before = self.now();
+        self.resting = Some(self.cpu.get_data().nvic.pending_set());
         let next = self.cpu.get_data().deadline().min(until);
-        self.pass_to(next);
+        self.sleep_to(next);
+    }
+
+    fn sleep_to(&mut self, instant: Time) {
+        let before = self.now();
+        self.pass_to(instant);
         let core = self.cpu.get_data_mut();
         core.stats.asleep += core.now - before;
     }
@@ -466,6 +518,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         core.halt = None;
         core.look_again();
         core.unmapped = None;
+        core.denied = None;
         let result = self.cpu.emu_start(u64::from(self.pc() | 1), NOWHERE, 0, 0);
         match (result, self.cpu.get_data_mut().halt.take()) {
             (_, Some(Halt::Attention)) => {}
@@ -486,7 +539,11 @@ impl<P: Peripherals + 'static> Machine<P> {
                 self.sleeping = true;
                 // WFI has two bytes.
                 let address = self.pc().wrapping_sub(2);
-                self.cpu.get_data_mut().chip.slept(address);
+                let core = self.cpu.get_data_mut();
+                core.chip.slept(address);
+                if core.scb.scr & SLEEPDEEP != 0 {
+                    core.report(Breach::NotModelled { what: "WFI with SLEEPDEEP, which stops the clocks," });
+                }
             }
         }
     }
@@ -505,6 +562,9 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     fn fault_of(&self, error: uc_error) -> Fault {
         let pc = self.pc();
+        if let Some(page) = self.cpu.get_data().denied {
+            return Fault::protection(pc, self.accessed(page));
+        }
         match self.cpu.get_data().unmapped {
             Some(access) if access.fetch => Fault::fetch(pc),
             Some(access) => Fault::data(pc, access.address),
@@ -513,6 +573,14 @@ impl<P: Peripherals + 'static> Machine<P> {
             None if self.register(RegisterARM::XPSR) & THUMB == 0 => Fault::usage(pc, cfsr::INVSTATE),
             None => Fault::undefined(pc),
         }
+    }
+
+    /// The address of the access to a page by the current instruction, as far as it can be told.
+    fn accessed(&self, page: u32) -> u32 {
+        let mut code = [0; stepping::LONGEST_BLOCK];
+        let _ = self.read(self.pc(), &mut code);
+        let address = alignment::accessed(&code, |number| engine::core_register(&self.cpu, number));
+        address.filter(|address| address >> 10 == page >> 10).unwrap_or(page)
     }
 
     /// Takes an SVC. An SVC that cannot be taken at once becomes a HardFault (ARMv7-M, B1.5.2).
@@ -549,6 +617,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.cpu.get_data_mut().memory.protection_is_new = true;
         self.cpu.get_data_mut().memory.code_is_old = true;
         self.sleeping = false;
+        self.resting = None;
         self.locked = None;
         self.stall = Time::ZERO;
         self.loading = false;

@@ -1,5 +1,8 @@
-//! The memory protection unit (ARMv7-M, B3.5). Only the protection against execution is modelled. A region that
-//! restricts data accesses is refused, so that no program relies on a missing protection.
+//! The memory protection unit (ARMv7-M, B3.5), page by page of a kilobyte and with the rights of privileged code. A region
+//! that is finer, or that tells privileged data accesses from others, is reported, so that no program relies on a missing
+//! protection.
+
+use unicorn_engine::Prot;
 
 /// Number of regions.
 const REGIONS: usize = 8;
@@ -12,7 +15,15 @@ const PRIVDEFENA: u32 = 1 << 2;
 /// Fields of RASR.
 const XN: u32 = 1 << 28;
 const ACCESS: u32 = 0b111 << 24;
+const NOBODY: u32 = 0;
 const FULL_ACCESS: u32 = 0b011 << 24;
+const PRIVILEGED_READ_ONLY: u32 = 0b101 << 24;
+const READ_ONLY: u32 = 0b110 << 24;
+const READ_ONLY_TOO: u32 = 0b111 << 24;
+/// The size of a page of the CPU library, as an exponent of 2.
+const PAGE: u32 = 10;
+/// The begin of the system space.
+const SYSTEM: u32 = 0xE000_0000;
 /// The size of the smallest region with sub-regions, 256 bytes, as an exponent of 2.
 const LEAST_DIVIDED: u32 = 8;
 
@@ -56,7 +67,7 @@ impl Mpu {
         })
     }
 
-    /// `None` for settings that are not modelled.
+    /// `None` for an unknown register.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             0x00 => {}
@@ -69,15 +80,43 @@ impl Mpu {
                 }
                 self.regions[self.number as usize].base = value & !0x1F;
             }
-            0x10 | 0x18 | 0x20 | 0x28 => {
-                if value & 1 != 0 && value & ACCESS != FULL_ACCESS {
-                    return None;
-                }
-                self.regions[self.number as usize].attributes = value;
-            }
+            0x10 | 0x18 | 0x20 | 0x28 => self.regions[self.number as usize].attributes = value,
             _ => return None,
         }
         Some(())
+    }
+
+    /// What is not modelled of the region that was written last.
+    pub(crate) fn not_modelled(&self) -> Option<&'static str> {
+        let region = self.regions[self.number as usize];
+        let exponent = (region.attributes >> 1 & 0x1F) + 1;
+        let is_divided = region.attributes & 0xFF00 != 0;
+        let finest = if is_divided { exponent.saturating_sub(3) } else { exponent };
+        let access = region.attributes & ACCESS;
+        let is_for_all = matches!(access, NOBODY | READ_ONLY | READ_ONLY_TOO);
+        if region.attributes & 1 == 0 || access == FULL_ACCESS {
+            None
+        } else if finest < PAGE {
+            Some("a region of less than a kilobyte that protects data")
+        } else {
+            (!is_for_all).then_some("a region that protects data from unprivileged code")
+        }
+    }
+
+    /// The rights of data accesses by privileged code to the page of an address. The unit does not protect the system
+    /// space.
+    pub(crate) fn data_rights(&self, address: u32) -> Prot {
+        let all = Prot::READ | Prot::WRITE;
+        if self.control & ENABLE == 0 || address >= SYSTEM {
+            return all;
+        }
+        let region = self.regions.iter().rev().find(|region| region.covers(address));
+        match region.map(|region| region.attributes & ACCESS) {
+            None if self.control & PRIVDEFENA != 0 => all,
+            None | Some(NOBODY) => Prot::NONE,
+            Some(PRIVILEGED_READ_ONLY | READ_ONLY | READ_ONLY_TOO) => Prot::READ,
+            _ => all,
+        }
     }
 
     /// Whether an instruction may be fetched from an address. The region with the highest number that covers the
@@ -125,13 +164,35 @@ mod tests {
     }
 
     #[test]
-    fn registers_read_back_and_what_is_not_modelled_is_refused() {
+    fn data_is_protected_by_the_page() {
+        let mut mpu = Mpu::default();
+        let all = Prot::READ | Prot::WRITE;
+        let set = |mpu: &mut Mpu, address: u32, access: u32, exponent: u32| {
+            mpu.write(0x0C, address | VALID).unwrap();
+            mpu.write(0x10, access << 24 | (exponent - 1) << 1 | 1).unwrap();
+        };
+        set(&mut mpu, 0x2000_0400, 0, 10);
+        assert_eq!((mpu.data_rights(0x2000_0400), mpu.not_modelled()), (all, None), "the unit is off");
+        mpu.write(0x04, ENABLE | PRIVDEFENA).unwrap();
+        assert_eq!(mpu.data_rights(0x2000_0400), Prot::NONE);
+        assert_eq!((mpu.data_rights(0x2000_03FF), mpu.data_rights(0x2000_0800)), (all, all));
+        set(&mut mpu, 0x2000_0400, 0b110, 10);
+        assert_eq!(mpu.data_rights(0x2000_0400), Prot::READ);
+        set(&mut mpu, 0x2000_0400, 0, 5);
+        assert!(mpu.not_modelled().unwrap().contains("less than a kilobyte"));
+        set(&mut mpu, 0x2000_0400, 0b001, 10);
+        assert!(mpu.not_modelled().unwrap().contains("unprivileged"));
+        mpu.write(0x04, ENABLE).unwrap();
+        assert_eq!((mpu.data_rights(0x4000_0000), mpu.data_rights(0xE000_E000)), (Prot::NONE, all));
+    }
+
+    #[test]
+    fn registers_read_back() {
         let mut mpu = confined();
         assert_eq!(mpu.read(0x00), Some(0x800));
         assert_eq!((mpu.read(0x08), mpu.read(0x0C)), (Some(1), Some(0x2000_0001)));
         mpu.write(0x08, 0).unwrap();
         assert_eq!(mpu.read(0x10), Some(XN | FULL_ACCESS | 29 << 1 | 1));
-        assert_eq!(mpu.write(0x10, 0b110 << 24 | 1), None, "read only");
         assert_eq!((mpu.write(0x2C, 0), mpu.read(0x2C)), (None, None));
     }
 }

@@ -47,10 +47,14 @@ impl Nvic {
     /// Takes the levels of the interrupt lines. A rising line pends; a line that stays high pends again when its
     /// exception ends.
     pub(crate) fn sample(&mut self, lines: IrqLines) {
-        let nmi = if lines.nmi { Exception::NMI.bit() } else { 0 };
-        let lines = lines.irqs << 16 | nmi;
+        let lines = exceptions_of(lines);
         self.pending |= lines & !self.lines;
         self.lines = lines;
+    }
+
+    /// Whether the lines are as they were at the last sample.
+    pub(crate) fn has_seen(&self, lines: IrqLines) -> bool {
+        self.lines == exceptions_of(lines)
     }
 
     pub(crate) fn pend(&mut self, exception: Exception) {
@@ -243,6 +247,11 @@ impl Nvic {
     pub(crate) fn clear_pending(&mut self, word: u32, bits: u32) {
         self.clear(irq_bits(word, bits));
     }
+}
+
+/// The exceptions of the lines that are high.
+fn exceptions_of(lines: IrqLines) -> u128 {
+    lines.irqs << 16 | if lines.nmi { Exception::NMI.bit() } else { 0 }
 }
 
 /// The exceptions of a set.

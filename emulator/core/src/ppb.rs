@@ -15,6 +15,9 @@ pub(crate) const SIZE: u32 = 0x0010_0000;
 const DBGMCU: u32 = 0xE004_2000;
 const DBGMCU_END: u32 = 0xE004_23FF;
 
+/// The configurable fault status register.
+pub(crate) const CFSR: u32 = 0xE000_ED28;
+
 /// The memory protection unit: MPU_TYPE to the last alias of MPU_RASR.
 pub(crate) const MPU: u32 = 0xE000_ED90;
 pub(crate) const MPU_END: u32 = 0xE000_EDB8;
@@ -61,7 +64,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_ED14 => self.scb.ccr,
             0xE000_ED18..=0xE000_ED20 => self.priorities(4 + (address - 0xE000_ED18)),
             0xE000_ED24 => self.scb.shcsr | self.nvic.system_states(),
-            0xE000_ED28 => self.scb.cfsr,
+            CFSR => self.scb.cfsr,
             0xE000_ED2C => self.scb.hfsr,
             0xE000_ED34 => self.scb.mmfar,
             0xE000_ED38 => self.scb.bfar,
@@ -70,6 +73,8 @@ impl<P: Peripherals> Core<P> {
             0xE000_EDF0 => 0,
             0xE000_EDFC => self.scb.demcr,
             0xE000_EF34 => self.scb.fpccr,
+            0xE000_EF38 => self.scb.fpcar,
+            0xE000_EF3C => self.scb.fpdscr,
             DBGMCU..=DBGMCU_END => self.chip.read(address, 4, self.now).ok()?,
             _ => return None,
         })
@@ -87,7 +92,10 @@ impl<P: Peripherals> Core<P> {
             0xE000_E010..=0xE000_E01C => {
                 self.systick.write(address - 0xE000_E010, value, self.now, self.cycle);
             }
-            0xE000_E100..=0xE000_E11C => self.nvic.enable((address - 0xE000_E100) / 4, value),
+            0xE000_E100..=0xE000_E11C => {
+                let word = (address - 0xE000_E100) / 4;
+                self.nvic.enable(word, value & self.present(word));
+            }
             0xE000_E180..=0xE000_E19C => self.nvic.disable((address - 0xE000_E180) / 4, value),
             0xE000_E200..=0xE000_E21C => self.pend_irqs((address - 0xE000_E200) / 4, value),
             0xE000_E280..=0xE000_E29C => self.nvic.clear_pending((address - 0xE000_E280) / 4, value),
@@ -96,30 +104,47 @@ impl<P: Peripherals> Core<P> {
             0xE000_ED08 => {
                 self.scb.vtor = value & 0x3FFF_FF80;
                 self.memory.code_is_old = true;
+                let least = (4 * (16 + self.chip.interrupts())).next_power_of_two();
+                if !value.is_multiple_of(least) {
+                    self.report(Breach::VectorTable { address: value, least });
+                }
             }
             0xE000_ED0C => self.set_aircr(value),
             0xE000_ED10 => self.scb.scr = value & 0x16,
             0xE000_ED14 => self.set_ccr(value),
             0xE000_ED18..=0xE000_ED20 => self.set_priorities(4 + (address - 0xE000_ED18), value),
             0xE000_ED24 => self.scb.shcsr = value & 0x0007_0000,
-            0xE000_ED28 => self.scb.cfsr &= !value,
+            CFSR => self.scb.cfsr &= !value,
             0xE000_ED2C => self.scb.hfsr &= !value,
             0xE000_ED34 => self.scb.mmfar = value,
             0xE000_ED38 => self.scb.bfar = value,
             0xE000_ED88 => self.scb.cpacr = value,
-            MPU..=MPU_END => self.scb.mpu.write(address - MPU, value)?,
+            MPU..=MPU_END => {
+                self.scb.mpu.write(address - MPU, value)?;
+                if let Some(what) = self.scb.mpu.not_modelled() {
+                    self.report(Breach::NotModelled { what });
+                }
+            }
             0xE000_EDFC => self.set_demcr(value),
             0xE000_EF00 => self.pend_irqs((value >> 5) & 3, 1 << (value & 31)),
             0xE000_EF34 => self.scb.fpccr = value,
+            0xE000_EF38 => self.scb.fpcar = value & !7,
+            0xE000_EF3C => self.scb.fpdscr = value & 0x07C0_0000,
             DBGMCU..=DBGMCU_END => self.chip.write(address, 4, value, self.now).ok()?,
             _ => return None,
         }
         Some(())
     }
 
+    /// The interrupts of a register that the chip has.
+    fn present(&self, word: u32) -> u32 {
+        let left = self.chip.interrupts().saturating_sub(32 * word);
+        if left >= 32 { u32::MAX } else { (1 << left) - 1 }
+    }
+
     fn pend_irqs(&mut self, word: u32, bits: u32) {
         let before = self.nvic.pending_set();
-        self.nvic.set_pending(word, bits);
+        self.nvic.set_pending(word, bits & self.present(word));
         self.stamp(self.nvic.pending_set() & !before);
     }
 

@@ -7,6 +7,9 @@ use crate::ppb;
 /// Fault status bits of CFSR.
 pub(crate) mod cfsr {
     pub(crate) const IACCVIOL: u32 = 1 << 0;
+    pub(crate) const DACCVIOL: u32 = 1 << 1;
+    pub(crate) const MSTKERR: u32 = 1 << 4;
+    pub(crate) const MMARVALID: u32 = 1 << 7;
     pub(crate) const IBUSERR: u32 = 1 << 8;
     pub(crate) const PRECISERR: u32 = 1 << 9;
     pub(crate) const IMPRECISERR: u32 = 1 << 10;
@@ -39,6 +42,8 @@ pub(crate) struct Scb {
     pub(crate) mmfar: u32,
     pub(crate) cpacr: u32,
     pub(crate) fpccr: u32,
+    pub(crate) fpcar: u32,
+    pub(crate) fpdscr: u32,
     pub(crate) demcr: u32,
     pub(crate) actlr: u32,
     pub(crate) mpu: Mpu,
@@ -56,7 +61,9 @@ impl Default for Scb {
             bfar: 0,
             mmfar: 0,
             cpacr: 0,
-            fpccr: 0xC000_0000,
+            fpccr: ASPEN | LSPEN,
+            fpcar: 0,
+            fpdscr: 0,
             demcr: 0,
             actlr: 0,
             mpu: Mpu::default(),
@@ -68,6 +75,15 @@ impl Default for Scb {
 /// 4.3.1).
 const DISDEFWBUF: u32 = 1 << 1;
 
+/// SCR: WFI enters Stop or Standby.
+pub(crate) const SLEEPDEEP: u32 = 1 << 2;
+
+/// FPCCR: a frame has room for the floating-point registers; they are saved at the first use only; that use is still to
+/// come (ARMv7-M, B3.2.21).
+const ASPEN: u32 = 1 << 31;
+const LSPEN: u32 = 1 << 30;
+const LSPACT: u32 = 1 << 0;
+
 /// CCR: traps of unaligned accesses and of divisions by zero.
 pub(crate) const UNALIGN_TRP: u32 = 1 << 3;
 pub(crate) const DIV_0_TRP: u32 = 1 << 4;
@@ -76,6 +92,30 @@ impl Scb {
     /// Whether CPACR allows the floating-point unit: privileged access to CP10 and CP11.
     pub(crate) fn allows_floats(&self) -> bool {
         self.cpacr >> 20 & 0b0101 == 0b0101
+    }
+
+    /// Whether the frame of an exception has the floating-point registers, if they are in use.
+    pub(crate) fn stacks_floats(&self) -> bool {
+        self.fpccr & ASPEN != 0
+    }
+
+    /// A frame with floating-point registers at this address begins: the program can see that they are saved later.
+    pub(crate) fn begin_lazy(&mut self, registers: u32) {
+        if self.fpccr & LSPEN != 0 {
+            self.fpccr |= LSPACT;
+            self.fpcar = registers & !7;
+        }
+    }
+
+    /// The registers are saved, or restored.
+    pub(crate) fn end_lazy(&mut self) {
+        self.fpccr &= !LSPACT;
+    }
+
+    /// Records the fault of a data access that the memory protection unit forbids.
+    pub(crate) fn note_protection_fault(&mut self, address: u32) {
+        self.cfsr |= cfsr::DACCVIOL | cfsr::MMARVALID;
+        self.mmfar = address;
     }
 
     /// Whether a store is buffered. The fault of a failed buffered store comes later, and without its address. Stores

@@ -31,6 +31,9 @@ pub enum Access {
         /// The ignored bits.
         bits: u32,
     },
+    /// A read waits neither for a store on its way to the same bus nor for the bus, as if it were not there. The first shows
+    /// after [`Machine::interleave`] only.
+    Unordered,
 }
 
 impl Access {
@@ -40,7 +43,7 @@ impl Access {
         let (bits, wrong) = match self {
             Access::Missing => return None,
             Access::Wrong { bits, value } => (bits, value),
-            Access::Unseen { .. } => (0, 0),
+            Access::Unseen { .. } | Access::Unordered => (0, 0),
         };
         let width = u32::MAX >> (32 - 8 * size);
         let (bits, wrong) = (bits >> (8 * lane) & width, wrong >> (8 * lane));
@@ -67,6 +70,11 @@ impl Bugs {
     /// The value that the program reads with its bugs.
     pub(crate) fn seen(&self, address: u32, value: u32) -> u32 {
         self.of(address).fold(value, |value, access| access.seen_of(value, address & 3))
+    }
+
+    /// Whether a read of the register does not wait for earlier stores.
+    pub(crate) fn ignores_order(&self, address: u32) -> bool {
+        self.of(address).any(|access| access == Access::Unordered)
     }
 
     fn of(&self, address: u32) -> impl Iterator<Item = Access> {

@@ -23,6 +23,8 @@ pub(crate) struct Stepping {
     conditional: Range<u32>,
     /// The exception to pend, and the address of the instruction before which it is pended.
     place: Option<(u32, Exception)>,
+    /// The addresses of barriers that a test has taken out.
+    omitted: Vec<u32>,
 }
 
 impl Stepping {
@@ -52,12 +54,33 @@ impl Stepping {
         self.conditional = first + size..first + block;
     }
 
-    /// Extra cycles of the next instruction (xorshift64).
+    /// Takes the barrier at an address out.
+    pub(crate) fn omit(&mut self, address: u32) {
+        self.omitted.push(address);
+    }
+
+    /// Whether the barrier at an address was taken out.
+    pub(crate) fn omits(&self, address: u32) -> bool {
+        self.omitted.contains(&address)
+    }
+
+    /// Extra cycles of the next instruction.
     pub(crate) fn wait(&mut self) -> u32 {
+        self.draw();
+        if self.random % 8 == 1 { (self.random >> 8 & LONGEST_WAIT) as u32 } else { 0 }
+    }
+
+    /// One of two numbers of cycles; without a seed the second.
+    pub(crate) fn either(&mut self, one: u32, other: u32) -> u32 {
+        self.draw();
+        if self.random >> 20 & 1 != 0 { one } else { other }
+    }
+
+    /// The next random number (xorshift64).
+    fn draw(&mut self) {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 7;
         self.random ^= self.random << 17;
-        if self.random % 8 == 1 { (self.random >> 8 & LONGEST_WAIT) as u32 } else { 0 }
     }
 }
 

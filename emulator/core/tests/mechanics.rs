@@ -5,7 +5,7 @@ mod bench;
 
 use bench::{Bench, Verdict};
 use canbus::Time;
-use emulator::{Exception, Mechanism};
+use emulator::{Estimate, Exception, Mechanism};
 
 /// The program passes with the mechanism, and fails or hangs without it.
 fn shows(program: &str, mechanism: Mechanism) {
@@ -58,6 +58,20 @@ fn code_runs_where_the_protection_unit_allows_it() {
 #[test]
 fn code_programmed_into_flash_runs() {
     shows("self_modified", Mechanism::Retranslation);
+}
+
+/// In all modes: between blocks, between instructions, and with the most cycles.
+#[test]
+fn no_bit_of_flash_comes_back_without_an_erase() {
+    for (mode, change) in [
+        ("the usual one", None::<fn(&mut Bench)>),
+        ("interleaved", Some(|bench| bench.machine.interleave(Some(1)).unwrap())),
+        ("the most cycles", Some(|bench| bench.machine.set_estimate(Estimate::Worst).unwrap())),
+    ] {
+        let mut bench = Bench::new("programmed_twice");
+        change.into_iter().for_each(|change| change(&mut bench));
+        assert_eq!(bench.run(), Verdict::Passed, "{mode}");
+    }
 }
 
 #[test]

@@ -113,3 +113,34 @@ fn the_same_seed_gives_the_same_run() {
     assert_eq!(trace(1), trace(1));
     assert_ne!(trace(1), trace(2));
 }
+
+/// What `posted_stores` notes, without and with a barrier or a read in between: entries of a handler that lowers its line
+/// last; whether an interrupt is pending again after its line was lowered; what a register takes behind its clock.
+fn posted(bench: &mut Bench) -> [u32; 6] {
+    assert_eq!(bench.run_long(), Verdict::Passed);
+    std::array::from_fn(|index| bench.note(index as u32))
+}
+
+#[test]
+fn a_store_takes_its_time_to_a_peripheral() {
+    assert_eq!(posted(&mut Bench::new("posted_stores")), [1, 1, 0, 0, 7, 7], "at once in the usual mode");
+    let mut bench = Bench::new("posted_stores");
+    bench.machine.interleave(None).unwrap();
+    assert_eq!(posted(&mut bench), [2, 1, 1, 0, 0, 7]);
+    for seed in seeds() {
+        let mut bench = Bench::new("posted_stores");
+        bench.machine.interleave(Some(seed)).unwrap();
+        let [_, with_barrier, _, with_read, _, behind] = posted(&mut bench);
+        assert_eq!((with_barrier, with_read, behind), (1, 0, 7), "seed {seed}");
+    }
+}
+
+/// Without its barriers the program sees the same as where it has none.
+#[test]
+fn a_barrier_that_is_taken_out_is_missing() {
+    let (start, size) = Bench::function("posted_stores", "TIM2");
+    let mut bench = Bench::new("posted_stores");
+    bench.machine.interleave(None).unwrap();
+    (start..start + size).step_by(2).for_each(|address| bench.machine.omit_barrier(address));
+    assert_eq!(posted(&mut bench)[..2], [2, 2]);
+}

@@ -1,6 +1,7 @@
 //! One emulated board: the machine that runs the images, its flash, its log, and its counters.
 
 use std::rc::Rc;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
@@ -56,6 +57,17 @@ pub enum Programs {
     Others,
 }
 
+/// How far all boards run next.
+#[derive(Clone, Copy)]
+pub(crate) struct Turn {
+    /// The end of the turn.
+    pub(crate) limit: Time,
+    /// A frame is on the wire: a request can wait for its end.
+    pub(crate) bus_is_busy: bool,
+    /// The host's time is measured.
+    pub(crate) is_measured: bool,
+}
+
 /// One emulated board.
 pub struct Board {
     id: u8,
@@ -71,6 +83,8 @@ pub struct Board {
     /// Whether the supply was above the level of the chip's reset.
     is_supplied: bool,
     bad_reads: BadReads,
+    /// The host's time for this board, if measured.
+    host: Duration,
 }
 
 impl Board {
@@ -115,6 +129,7 @@ impl Board {
             locked_up: None,
             is_supplied: true,
             bad_reads: BadReads::default(),
+            host: Duration::ZERO,
         })
     }
 
@@ -138,32 +153,54 @@ impl Board {
         self.machine.flash_changes()
     }
 
-    /// Runs to `limit`, or to the request of a frame if that comes first; returns the instant reached.
-    pub(crate) fn run_until(&mut self, limit: Time) -> Time {
-        let limit = self.follow_supply(limit);
-        let stop = self.machine.run_until(limit);
-        self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
-        if stop == Stop::Poked { limit.min(self.machine.now()) } else { limit }
+    /// The earliest instant at which the board can request a frame, if the bus changes nothing before.
+    pub(crate) fn next_event(&self) -> Time {
+        self.machine.next_event().min(self.next_look())
+    }
+
+    /// Runs to the end of a turn, or to an earlier request of a frame on an idle bus; returns the instant reached.
+    pub(crate) fn run(&mut self, turn: Turn) -> Time {
+        let start = turn.is_measured.then(Instant::now);
+        let limit = self.follow_supply(turn.limit);
+        let reached = loop {
+            let stop = self.machine.run_until(limit);
+            self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
+            match stop {
+                Stop::Poked if turn.bus_is_busy => {}
+                Stop::Poked => break limit.min(self.machine.now()),
+                _ => break limit,
+            }
+        };
+        self.host += start.map_or(Duration::ZERO, |start| start.elapsed());
+        reached
     }
 
     /// Switches the chip on or off where the supply crosses the level of its reset. Returns the instant of the next look
     /// at a supply that changes, or `limit`.
     fn follow_supply(&mut self, limit: Time) -> Time {
-        const LOOK: Time = Time::from_micros(100);
         let (now, chip) = (self.machine.now(), self.machine.peripherals());
         let is_supplied = chip.is_supplied(now, self.is_supplied);
         let is_too_slow = is_supplied && chip.reads_flash_too_fast(now);
-        let is_steady = matches!(chip.plant().supply_signal(), Signal::Constant(_)) && !is_too_slow;
         self.bad_reads.step(&mut self.machine, is_too_slow);
         if is_supplied != self.is_supplied {
             self.is_supplied = is_supplied;
             if is_supplied { self.machine.power_on(now) } else { self.machine.power_off() }
         }
-        if is_steady { limit } else { limit.min(now + LOOK) }
+        limit.min(self.next_look())
     }
 
-    /// Core, memory and chip.
+    /// The next look at the supply.
+    fn next_look(&self) -> Time {
+        const LOOK: Time = Time::from_micros(100);
+        let (now, chip) = (self.machine.now(), self.machine.peripherals());
+        let is_too_slow = self.is_supplied && chip.reads_flash_too_fast(now);
+        let is_steady = matches!(chip.plant().supply_signal(), Signal::Constant(_)) && !is_too_slow;
+        if is_steady { Time::NEVER } else { now + LOOK }
+    }
+
+    /// Core, memory and chip, for a change from outside.
     pub(crate) fn machine(&mut self) -> &mut Machine<Stm32f4> {
+        self.machine.stir();
         &mut self.machine
     }
 
@@ -175,7 +212,7 @@ impl Board {
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
         // The board may have run a few instructions further, and the chip's time cannot go back.
         let now = now.max(self.machine.now());
-        stimulus.act_on(self.machine.peripherals_mut(), now);
+        stimulus.act_on(self.machine().peripherals_mut(), now);
     }
 
     /// The current stimuli of the sensors.
@@ -277,6 +314,7 @@ impl Board {
             id: self.id,
             personality: self.personality,
             heard,
+            host_seconds: (!self.host.is_zero()).then_some(self.host.as_secs_f64()),
             sampling: figures::sampling(&self.machine),
             receiving: figures::receiving(&self.machine),
             cpu: figures::cpu(&self.machine),

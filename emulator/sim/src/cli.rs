@@ -1,6 +1,7 @@
 //! The command line.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, ToSocketAddrs};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -55,6 +56,11 @@ pub struct Options {
     /// As fast as a real board, or as fast as this machine can.
     #[arg(long, value_enum, default_value = "real")]
     pub speed: Speed,
+
+    /// Run the boards on at most this many threads; the default is one for each core of the host. The run is the same
+    /// with any number.
+    #[arg(long, value_name = "COUNT")]
+    pub threads: Option<NonZeroUsize>,
 
     /// Stop after this much virtual time.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
@@ -279,7 +285,7 @@ mod tests {
     #[test]
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
-             --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
+             --speed max --threads 2 --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
              --reflash --interleave 7 --cycles worst --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --lsi 2=17000 --load 50 --json --socketcan vcan0 --no-page --control 127.0.0.1:0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
@@ -319,6 +325,7 @@ mod tests {
             ("--oscillator 1=30000", "20000 ppm"),
             ("--lsi 10000", "17000 to 47000 Hz"),
             ("--speed warp", "real, max"),
+            ("--threads 0", "--threads"),
             ("--wings", "--wings"),
         ];
         for (flags, reason) in wrong {

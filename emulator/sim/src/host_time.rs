@@ -10,6 +10,8 @@ use serde::{Serialize, Serializer};
 pub enum Work {
     /// The cores and the chips of the boards.
     Boards,
+    /// The wait for the boards of other threads.
+    Waiting,
     /// The bus.
     Bus,
     /// The clients of the gateway.
@@ -19,7 +21,7 @@ pub enum Work {
 }
 
 /// Names of the kinds of work, in the order of [`Work`].
-const NAMES: [&str; 4] = ["boards", "bus", "clients", "output"];
+const NAMES: [&str; 5] = ["boards", "waiting", "bus", "clients", "output"];
 
 /// The host's time by kind of work.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,9 +64,12 @@ mod tests {
 
     #[test]
     fn shares_of_what_was_counted() {
-        let time = HostTime([3, 1, 0, 0].map(Duration::from_secs));
-        assert_eq!(time.to_string(), "boards 75.0 %, bus 25.0 %, clients 0.0 %, output 0.0 %");
-        assert_eq!(HostTime::default().to_string(), "boards 0.0 %, bus 0.0 %, clients 0.0 %, output 0.0 %");
+        let time = HostTime([3, 0, 1, 0, 0].map(Duration::from_secs));
+        assert_eq!(time.to_string(), "boards 75.0 %, waiting 0.0 %, bus 25.0 %, clients 0.0 %, output 0.0 %");
+        assert_eq!(
+            HostTime::default().to_string(),
+            "boards 0.0 %, waiting 0.0 %, bus 0.0 %, clients 0.0 %, output 0.0 %"
+        );
         assert_eq!(serde_json::json!(time)["boards"], 3.0);
     }
 }

@@ -8,6 +8,9 @@ use defmt_decoder::Table;
 /// The greatest size of an ELF file in bytes, with its debug information.
 const LARGEST: u64 = 256 << 20;
 
+/// Parts of the paths of the compiler's own library, and of packages.
+const LIBRARIES: [&str; 2] = ["/library/", "/registry/"];
+
 /// The firmware or the bootloader.
 pub struct Image {
     /// The path of the file, for messages.
@@ -40,11 +43,23 @@ impl Image {
 }
 
 impl Image {
-    /// The source file and line of the code at an address.
+    /// The source file and line of the code at an address: of the innermost inlined function that is the program's own, and no
+    /// library's.
     pub(crate) fn place(&self, address: u32) -> Option<String> {
         let loader = addr2line::Loader::new(&self.path).ok()?;
-        let place = loader.find_location(address.into()).ok()??;
-        Some(format!("{}:{}", place.file?, place.line?))
+        let mut frames = loader.find_frames(address.into()).ok()?;
+        let mut innermost = None;
+        while let Ok(Some(frame)) = frames.next() {
+            let Some((file, line)) = frame.location.and_then(|place| Some((place.file?, place.line?))) else {
+                continue;
+            };
+            let place = format!("{file}:{line}");
+            if !LIBRARIES.iter().any(|library| file.contains(library)) {
+                return Some(place);
+            }
+            innermost.get_or_insert(place);
+        }
+        innermost
     }
 }
 

@@ -1,6 +1,6 @@
 //! `cargo sim`: emulated boards and a CAN bus in virtual time, for programs that communicate with the boards.
 //!
-//! [`world`] is the simulation: deterministic, in one thread, without sockets and without the host's clock. The
+//! [`world`] is the simulation: deterministic, whatever the number of its threads, without sockets and without the host's clock. The
 //! [`gateway`] serves clients, the [`display`] shows the state, and [`app`] connects all of them. Tests build a
 //! [`world::World`] with [`setup`] and run it as fast as possible.
 
@@ -26,6 +26,7 @@ pub mod traffic;
 pub mod world;
 
 mod bad_reads;
+mod crew;
 mod figures;
 mod greeting;
 mod keeper;

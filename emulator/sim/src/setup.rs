@@ -35,6 +35,9 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
+    if let Some(threads) = options.threads {
+        world.set_threads(threads);
+    }
     let boards = 0..options.nodes.len();
     boards.clone().try_for_each(|board| world.machine(board).set_estimate(options.cycles))?;
     if let Some(seed) = options.interleave {
@@ -85,6 +88,7 @@ fn chip(node: &Node, options: &Options) -> Stm32f4 {
     let Light { pin: standby, on } = board.standby;
     let mut wiring = Wiring {
         hse: oscillator.hertz(board.oscillator.hertz),
+        hse_is_clock: board.oscillator.is_bypassed,
         lsi: own(&options.lsi, node).map_or(Wiring::default().lsi, Lsi::hertz),
         buttons,
         front_end: front_end(&board.front_end),
@@ -118,6 +122,8 @@ fn front_end(board: &bsp::boards::FrontEnd) -> FrontEnd {
         thermistor: thermistor.ohms.into(),
         beta: thermistor.beta.into(),
         series: thermistor.series.into(),
+        divided: f64::from(divider.upper) * f64::from(divider.lower)
+            / f64::from(divider.upper + divider.lower),
     }
 }
 

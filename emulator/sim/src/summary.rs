@@ -49,6 +49,9 @@ pub struct NodeSummary {
     /// The state observed on the bus.
     #[serde(flatten)]
     pub heard: Heard,
+    /// Seconds of the host's time for this board, if measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub host_seconds: Option<f64>,
     /// The 1 kHz measurement.
     pub sampling: Sampling,
     /// The received frames.
@@ -171,6 +174,9 @@ impl fmt::Display for NodeSummary {
             "  memory: flash {} B (bootloader {} B), RAM {} B, deepest stack {} B",
             memory.flash, memory.bootloader_flash, memory.ram, memory.stack
         )?;
+        if let Some(seconds) = self.host_seconds {
+            writeln!(f, "  host: {seconds:.3} s")?;
+        }
         self.broken_rules.iter().try_for_each(|rule| writeln!(f, "  rule broken: {rule}"))?;
         self.incidents.iter().try_for_each(|incident| writeln!(f, "  {incident}"))?;
         self.unmodelled.iter().try_for_each(|access| writeln!(f, "  unmodelled register: {access}"))

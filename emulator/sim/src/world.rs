@@ -1,15 +1,19 @@
 //! The simulation: boards, the bus and all other participants of the bus, in one virtual time.
 //!
 //! The loop follows the documentation of [`canbus`]. With one board the simulation is exact. With several boards, a
-//! board may be ahead of a start of frame by less than the shortest frame, so that it misses no event of the frame.
+//! board may be ahead of a start of frame by less than the shortest frame, so that it misses no event of the frame. So
+//! between two events of the bus the boards depend on nothing but themselves, and run on several threads.
 
+use std::num::NonZeroUsize;
+use std::thread;
 use std::time::Instant;
 
 use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
 use chip::Stm32f4;
 use emulator::{Incident, Machine};
 
-use crate::board::Board;
+use crate::board::{Board, Turn};
+use crate::crew::Crew;
 use crate::host_time::{HostTime, Work};
 use crate::log::Line;
 use crate::port::Port;
@@ -56,6 +60,7 @@ pub struct World {
     bit: Time,
     bus: Bus,
     boards: Vec<Board>,
+    crew: Crew,
     /// The adapter of the host. It acknowledges frames even without a client, because a board alone on its bus could
     /// send nothing. Without a client, it is also the NMT master.
     host: HostNode,
@@ -118,6 +123,7 @@ impl World {
             bit_rate,
             bit,
             bus,
+            crew: Crew::new(threads(thread::available_parallelism().map_or(1, NonZeroUsize::get), &boards)),
             boards,
             host,
             load,
@@ -241,16 +247,18 @@ impl World {
             if self.now >= end {
                 break;
             }
-            let quantum =
-                if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
-            let start = self.measure(Work::Bus, start);
             self.show_incidents();
-            let mut limit = end.min(next).min(quantum);
-            for board in &mut self.boards {
-                limit = limit.min(board.run_until(limit));
-            }
-            self.measure(Work::Boards, start);
-            self.now = limit;
+            let turn = Turn {
+                limit: end.min(next).min(self.horizon()),
+                bus_is_busy: self.bus.is_busy(),
+                is_measured: start.is_some(),
+            };
+            let mut start = self.measure(Work::Bus, start);
+            let host_time = &mut self.host_time;
+            let rested =
+                || start = host_time.as_mut().zip(start).map(|(it, start)| it.count(Work::Boards, start));
+            self.now = self.crew.run(&mut self.boards, turn, rested);
+            self.measure(Work::Waiting, start);
         }
         while self.host.receive().is_some() {}
         if let Some(observer) = &mut self.observer {
@@ -261,6 +269,21 @@ impl World {
             let broken: Vec<String> = self.boards.iter().flat_map(Board::broken_rules).collect();
             panic!("a rule of the chip is broken: {}", broken.join("; "));
         }
+    }
+
+    /// How far the boards may run before they see each other. On an idle bus a board can begin a frame at its next event,
+    /// and the others notice that a quantum later. A frame on the wire ends at an event of the bus.
+    fn horizon(&self) -> Time {
+        if self.boards.len() < 2 || self.bus.is_busy() {
+            return Time::NEVER;
+        }
+        let earliest = self.boards.iter().map(Board::next_event).min();
+        earliest.map_or(Time::NEVER, |earliest| earliest.max(self.now) + self.bit * QUANTUM_BITS)
+    }
+
+    /// Runs the boards on at most this many threads. The run is the same with any number.
+    pub fn set_threads(&mut self, count: NonZeroUsize) {
+        self.crew = Crew::new(threads(count.get(), &self.boards));
     }
 
     /// Sets whether a broken rule of the chip panics, or is only reported in the summary. A test that breaks a rule on
@@ -386,6 +409,11 @@ impl World {
             host_time: self.host_time,
         }
     }
+}
+
+/// The number of threads that have a board to run.
+fn threads(most: usize, boards: &[Board]) -> usize {
+    most.min(boards.len()).max(1)
 }
 
 impl Observed {

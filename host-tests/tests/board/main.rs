@@ -1,6 +1,7 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images --development` builds them.
 
 mod adapter;
+mod barriers;
 mod bringup;
 mod budget;
 mod bus_faults;
@@ -39,5 +40,6 @@ mod stack;
 mod start_up;
 mod supply;
 mod support;
+mod threads;
 mod timing;
 mod update;

@@ -34,7 +34,7 @@ const CR1_MODELLED: u32 = 0x1F | 1 << 5 | 1 << 8 | 3 << 24 | 1 << 26;
 /// Bits of CR2 that are modelled: all but JEXTEN and JSWSTART.
 const CR2_MODELLED: u32 = 0x7F0F_0F03;
 /// tSTAB of DS10693: 3 us at most.
-const STABILISATION: Time = Time::from_micros(3);
+pub(crate) const STABILISATION: Time = Time::from_micros(3);
 /// Regular trigger conversion latency, tlatr of DS10693: 2 cycles of the ADC clock.
 const TRIGGER_LATENCY: u32 = 2;
 
@@ -73,6 +73,8 @@ pub(crate) struct Adc {
     dr: u32,
     /// The end of the stabilisation time after ADON.
     stable: Time,
+    /// The time from ADON to a start before the end of that time.
+    early_start: Option<Time>,
     conversion: Option<Conversion>,
     /// DR has a value that has not been read.
     unread: bool,
@@ -93,6 +95,7 @@ impl Adc {
             cr2: 0,
             dr: 0,
             stable: Time::NEVER,
+            early_start: None,
             conversion: None,
             unread: false,
             request: false,
@@ -191,9 +194,17 @@ impl Adc {
 
     fn start(&mut self, at: Time) {
         if self.conversion.is_none() {
+            if at < self.stable {
+                self.early_start = Some(STABILISATION - (self.stable - at));
+            }
             self.sr |= 1 << STRT;
             self.convert(0, at.max(self.stable));
         }
+    }
+
+    /// Takes the time from ADON to a start before the ADC was stable, if there was one.
+    pub(crate) fn take_early_start(&mut self) -> Option<Time> {
+        self.early_start.take()
     }
 
     fn convert(&mut self, rank: usize, from: Time) {

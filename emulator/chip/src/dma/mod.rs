@@ -24,14 +24,15 @@ pub(crate) struct Dma {
 }
 
 impl Dma {
-    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+    /// A read shows the program which streams have stopped.
+    pub(crate) fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
             LISR => Some(self.status(0)),
             HISR => Some(self.status(4)),
             LIFCR | HIFCR => Some(0),
             _ => {
                 let (index, register) = locate(offset)?;
-                self.streams.get(index)?.read(register)
+                self.streams.get_mut(index)?.read(register)
             }
         }
     }
@@ -49,9 +50,9 @@ impl Dma {
         }
     }
 
-    fn status(&self, first: usize) -> u32 {
-        let streams = self.streams[first..].iter().zip(FLAG_SHIFT);
-        streams.fold(0, |word, (stream, shift)| word | stream.flags() << shift)
+    fn status(&mut self, first: usize) -> u32 {
+        let streams = self.streams[first..].iter_mut().zip(FLAG_SHIFT);
+        streams.fold(0, |word, (stream, shift)| word | stream.show_flags() << shift)
     }
 
     fn clear(&mut self, first: usize, value: u32) -> Option<()> {
@@ -77,9 +78,9 @@ impl Dma {
         request.iter().copied().find(|line| self.streams[line.stream].listens_to(line.channel))
     }
 
-    /// A stream that was enabled while flags of its last transfer were set.
-    pub(crate) fn take_begun_with_flags(&mut self) -> Option<usize> {
-        self.streams.iter_mut().position(Stream::take_begun_with_flags)
+    /// The first stream for which `takes` holds.
+    pub(crate) fn take(&mut self, takes: impl FnMut(&mut Stream) -> bool) -> Option<usize> {
+        self.streams.iter_mut().position(takes)
     }
 
     /// Levels of the interrupt lines of the streams.

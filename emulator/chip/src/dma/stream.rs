@@ -56,18 +56,39 @@ pub(crate) struct Stream {
     flags: u32,
     /// A transfer has begun while flags of the last transfer were set.
     begun_with_flags: bool,
+    /// The program has stopped the stream and has not seen its end yet.
+    is_stopping: bool,
+    /// The program has set the stream up in this state.
+    set_up_early: bool,
+    /// A transfer has begun with an address that is no multiple of its width.
+    odd_address: bool,
 }
 
 impl Default for Stream {
     fn default() -> Self {
-        Self { cr: 0, left: 0, all: 0, par: 0, memory: [0; 2], fcr: 0x21, flags: 0, begun_with_flags: false }
+        Self {
+            cr: 0,
+            left: 0,
+            all: 0,
+            par: 0,
+            memory: [0; 2],
+            fcr: 0x21,
+            flags: 0,
+            begun_with_flags: false,
+            is_stopping: false,
+            set_up_early: false,
+            odd_address: false,
+        }
     }
 }
 
 impl Stream {
-    pub(super) fn read(&self, register: u32) -> Option<u32> {
+    pub(super) fn read(&mut self, register: u32) -> Option<u32> {
         match register {
-            CR => Some(self.cr),
+            CR => {
+                self.is_stopping = false;
+                Some(self.cr)
+            }
             NDTR => Some(self.left),
             PAR => Some(self.par),
             M0AR => Some(self.memory[0]),
@@ -78,6 +99,7 @@ impl Stream {
     }
 
     pub(super) fn write(&mut self, register: u32, value: u32) -> Option<()> {
+        self.set_up_early |= self.is_stopping;
         match register {
             CR => return self.write_control(value),
             FCR => {
@@ -101,9 +123,11 @@ impl Stream {
             // Only EN and the interrupt enables can be written; a stop by software raises TCIF (RM0390 section 9.3.17).
             self.cr = self.cr & !0x1F | value & 0x1F;
             self.flags |= flag(!enable, TCIF);
+            self.is_stopping = !enable;
             return Some(());
         }
         self.cr = value & 0x0FEF_FFFF;
+        self.odd_address |= enable && (self.par | self.memory[0]) & (self.width() - 1) != 0;
         self.begun_with_flags |= enable && self.flags != 0;
         self.all = self.left;
         let memory_to_memory = field(value, 6, 2) >= 2;
@@ -120,8 +144,24 @@ impl Stream {
 
     /// Whether a transfer has begun, since the last call, while flags of the previous transfer were set (RM0390 section
     /// 9.5.5, EN).
-    pub(super) fn take_begun_with_flags(&mut self) -> bool {
+    pub(crate) fn take_begun_with_flags(&mut self) -> bool {
         std::mem::take(&mut self.begun_with_flags)
+    }
+
+    /// Whether the stream was set up, since the last call, before the program has seen that it has stopped (RM0390 section
+    /// 9.3.18).
+    pub(crate) fn take_set_up_early(&mut self) -> bool {
+        std::mem::take(&mut self.set_up_early)
+    }
+
+    /// Whether a transfer has begun, since the last call, with an address that is no multiple of its width.
+    pub(crate) fn take_odd_address(&mut self) -> bool {
+        std::mem::take(&mut self.odd_address)
+    }
+
+    /// Bytes of an item.
+    fn width(&self) -> u32 {
+        1 << field(self.cr, 11, 2).min(2)
     }
 
     fn enabled(&self) -> bool {
@@ -134,7 +174,7 @@ impl Stream {
 
     /// The next item; the caller moves the item and then calls `done` or `fail`.
     pub(crate) fn next(&self) -> Transfer {
-        let size = 1 << field(self.cr, 11, 2).min(2);
+        let size = self.width();
         let moved = (self.all - self.left) * size;
         let step = |increments: u32| if bit(self.cr, increments) { moved } else { 0 };
         let direction = if field(self.cr, 6, 2) == 0 {
@@ -188,7 +228,9 @@ impl Stream {
         if self.left > half { self.left - half } else { self.left }
     }
 
-    pub(super) fn flags(&self) -> u32 {
+    /// The flags as the program reads them: a stopped stream shows by its flag, too.
+    pub(super) fn show_flags(&mut self) -> u32 {
+        self.is_stopping = false;
         self.flags
     }
 

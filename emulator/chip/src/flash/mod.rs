@@ -92,6 +92,8 @@ pub struct Flash {
     cut_at: Option<u64>,
     /// BSY stays set until this instant, independent of the array.
     stuck_until: Time,
+    /// How often ICRST and DCRST have emptied a cache.
+    cache_resets: [u32; 2],
 }
 
 impl Flash {
@@ -110,6 +112,7 @@ impl Flash {
             operations: 0,
             cut_at: None,
             stuck_until: Time::ZERO,
+            cache_resets: [0; 2],
         }
     }
 
@@ -127,7 +130,9 @@ impl Flash {
     /// The settings for reads of the array (RM0390, 3.8.1).
     pub(crate) fn access(&self) -> FlashAccess {
         let (caches_code, caches_constants) = (bit(self.acr, 9), bit(self.acr, 10));
-        FlashAccess { wait_states: self.wait_states(), caches_code, caches_constants }
+        let [code_resets, constant_resets] = self.cache_resets;
+        let wait_states = self.wait_states();
+        FlashAccess { wait_states, caches_code, caches_constants, code_resets, constant_resets }
     }
 
     /// FLASH_ACR.LATENCY.
@@ -159,6 +164,21 @@ impl Flash {
     /// Whether an operation is under way with a parallelism of 32 bits or more.
     pub(crate) fn works_by_words(&self, now: Time) -> bool {
         now < self.busy_until && field(self.cr, 8, 2) >= 2
+    }
+
+    /// Whether an operation is under way with a parallelism of 64 bits.
+    pub(crate) fn works_by_double_words(&self, now: Time) -> bool {
+        now < self.busy_until && field(self.cr, 8, 2) == 3
+    }
+
+    /// The option bytes at an offset from 1FFF C000h (RM0390 section 3.6.1); what is reserved reads as 1.
+    pub(crate) fn option_bytes(&self, offset: u32) -> Option<u32> {
+        match offset {
+            0x0 => Some(0xFFFF_0000 | self.optcr & 0xFFEC | 0b11),
+            0x8 => Some(0xFFFF_F000 | field(self.optcr, OPTCR_NWRP, 12)),
+            0x4 | 0xC => Some(u32::MAX),
+            _ => None,
+        }
     }
 
     /// A reset. A reset in the middle of an erase leaves the sector torn.
@@ -194,7 +214,7 @@ impl Flash {
         effects: &mut VecDeque<Effect>,
     ) -> Result<Option<()>, BusFault> {
         match offset {
-            ACR => self.acr = value & 0x1F0F,
+            ACR => self.write_access(value),
             KEYR => self.lock.take(value)?,
             OPTKEYR => self.option_lock.take(value)?,
             SR => self.sr &= !(value & SR_CLEARABLE),
@@ -207,7 +227,20 @@ impl Flash {
         Ok(Some(()))
     }
 
+    /// ICRST and DCRST empty a cache that is off (RM0390 section 3.8.1).
+    fn write_access(&mut self, value: u32) {
+        for (resets, (enable, reset)) in self.cache_resets.iter_mut().zip([(9, 11), (10, 12)]) {
+            *resets += flag(bit(value, reset) && !bit(self.acr | value, enable), 0);
+        }
+        self.acr = value & 0x1F0F;
+    }
+
+    /// A write during an operation waits for the end of it (RM0390 section 3.8.4).
     fn write_control(&mut self, value: u32, now: Time, effects: &mut VecDeque<Effect>) {
+        self.end_work(effects);
+        if effects.back() == Some(&Effect::PowerCut) {
+            return;
+        }
         self.cr = value & CR_WRITABLE;
         self.half = None;
         if bit(value, CR_STRT) {

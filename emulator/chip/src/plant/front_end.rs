@@ -29,12 +29,35 @@ pub struct FrontEnd {
     pub beta: f64,
     /// The resistor from the thermistor to VDDA.
     pub series: f64,
+    /// The upper and the lower resistor of both dividers in parallel.
+    pub divided: f64,
+}
+
+impl FrontEnd {
+    /// The resistance of the source at an input of ADC1 in ohms; `None` for an input that the board does not use. The
+    /// thermistor is taken as cold, so that the resistor to VDDA counts alone.
+    pub(crate) fn source_resistance(&self, channel: u32) -> Option<f64> {
+        match channel {
+            0 | 1 => Some(self.divided),
+            12 => Some(self.series),
+            _ => None,
+        }
+    }
 }
 
 impl Default for FrontEnd {
     fn default() -> Self {
         let (supply, divider, output, full_scale) = (5.0, 0.6, (0.1, 0.9), 1_000_000.0);
-        Self { supply, divider, output, full_scale, thermistor: 10_000.0, beta: 3950.0, series: 10_000.0 }
+        Self {
+            supply,
+            divider,
+            output,
+            full_scale,
+            thermistor: 10_000.0,
+            beta: 3950.0,
+            series: 10_000.0,
+            divided: 6_000.0,
+        }
     }
 }
 

@@ -147,8 +147,8 @@ impl Timer {
             ARR => self.counter.top.write(value & self.counter.max(), bit(self.cr1, CR1_ARPE)),
             _ if self.kind.channels == 0 => return None,
             SMCR => return self.write_slave(value, now),
-            CCMR1 => self.ccmr[0] = value & 0xFFFF,
-            CCMR2 => self.ccmr[1] = value & 0xFFFF,
+            CCMR1 => self.write_modes(0, value),
+            CCMR2 => self.write_modes(1, value),
             CCER => self.ccer = value & 0xBBBB,
             OR if self.kind.sees_lsi => return self.write_options(value),
             CCR1..=CCR4 => return self.write_compare(offset, value),
@@ -188,6 +188,13 @@ impl Timer {
     /// Whether channel 4 captures edges of the LSI.
     pub(crate) fn measures_lsi(&self) -> bool {
         self.options == OR_LSI && self.listens(LSI_CHANNEL)
+    }
+
+    /// CCxS keeps its value while the channel is on (RM0390 section 17.4.7).
+    fn write_modes(&mut self, register: usize, value: u32) {
+        let is_on = |channel: usize| bit(self.ccer, (2 * register + channel) as u32 * 4);
+        let kept = if is_on(0) { 0x0003 } else { 0 } | if is_on(1) { 0x0300 } else { 0 };
+        self.ccmr[register] = value & 0xFFFF & !kept | self.ccmr[register] & kept;
     }
 
     fn write_compare(&mut self, offset: u32, value: u32) -> Option<()> {

@@ -6,6 +6,7 @@ mod conversions;
 mod encoder;
 mod flash;
 mod flash_interface;
+mod misuse;
 mod others;
 mod protection;
 mod rules;

@@ -42,6 +42,8 @@ struct Program {
 const TIMING: u32 = 1 << 20 | 14 << 16 | 1;
 /// Sample times of 480 cycles for channels 10 to 18.
 const LONG: u32 = 0x07FF_FFFF;
+/// Sample times of 28 cycles for channels 0 to 9.
+const SHORT: u32 = 0x1249_2492;
 
 const RIGHT: Program = Program {
     wait_states: 4,
@@ -105,7 +107,9 @@ impl Program {
         rig.write(ADC1 + 0x34, 17 << 5);
         rig.write(ADC1 + 0x2C, 1 << 20);
         rig.write(ADC1 + 0x04, 1 << 8);
+        rig.write(ADC1 + 0x10, SHORT);
         rig.write(ADC1 + 0x08, 1);
+        rig.wait(canbus::Time::from_micros(5));
         rig.write(ADC1 + 0x08, 1 << 30 | 1);
         rig.wait(canbus::Time::from_micros(100));
         rig.read(ADC1 + 0x4C);

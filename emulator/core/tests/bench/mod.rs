@@ -24,19 +24,48 @@ pub(crate) enum Verdict {
     Silent,
 }
 
-/// Flash that accepts any store as programming, and no other peripheral.
+/// The level of interrupt 28, on a slow bus.
+const LEVEL: u32 = 0x4000_0000;
+/// A register, and the clock without which it takes nothing.
+const CLOCKED: u32 = 0x4002_0000;
+const ENABLE: u32 = 0x4002_3830;
+
+/// Flash that accepts any store as programming, an interrupt line, and a register with a clock.
 #[derive(Default)]
 pub(crate) struct Bare {
     effects: Vec<Effect>,
+    level: u32,
+    clock: u32,
+    clocked: u32,
 }
 
 impl Peripherals for Bare {
-    fn read(&mut self, _: u32, _: u8, _: Time) -> Result<u32, BusFault> {
-        Err(BusFault)
+    fn read(&mut self, address: u32, _: u8, _: Time) -> Result<u32, BusFault> {
+        match address {
+            LEVEL => Ok(self.level),
+            ENABLE => Ok(self.clock),
+            CLOCKED => Ok(self.clocked),
+            _ => Err(BusFault),
+        }
     }
 
-    fn write(&mut self, _: u32, _: u8, _: u32, _: Time) -> Result<(), BusFault> {
-        Err(BusFault)
+    fn write(&mut self, address: u32, _: u8, value: u32, _: Time) -> Result<(), BusFault> {
+        match address {
+            LEVEL => self.level = value,
+            ENABLE => self.clock = value,
+            CLOCKED if self.clock & 1 != 0 => self.clocked = value,
+            CLOCKED => {}
+            _ => return Err(BusFault),
+        }
+        Ok(())
+    }
+
+    fn apb_divider(&self, address: u32) -> Option<u32> {
+        (address == LEVEL).then_some(16)
+    }
+
+    fn settling(&self, address: u32) -> u32 {
+        if address == ENABLE { 2 } else { 0 }
     }
 
     fn program(&mut self, address: u32, old: &[u8], new: &[u8], now: Time) -> Result<(), BusFault> {
@@ -53,7 +82,7 @@ impl Peripherals for Bare {
     fn advance(&mut self, _: Time, _: &dyn Memory) {}
 
     fn lines(&self) -> IrqLines {
-        IrqLines::default()
+        IrqLines { irqs: u128::from(self.level & 1) << 28, nmi: false }
     }
 
     fn effect(&mut self) -> Option<Effect> {

@@ -117,6 +117,7 @@ pub(super) const STORES: &[Row] = &[
     wrong("input of the PLL too fast", PLLCFGR, 0x3F, 2, "the input of the PLL at 4000000 Hz"),
     wrong("APB1 not divided", CFGR, 0b111 << 10, 0, "PCLK1 at 144000000 Hz"),
     wrong("APB2 not divided", CFGR, 0b111 << 13, 0, "PCLK2 at 144000000 Hz"),
+    wrong("clock taken for a crystal", RCC, 1 << 18, 0, "HSE is switched on for a crystal"),
     wrong("regulator at scale 3", PWR_CR, 0b11 << 14, 0b01 << 14, "HCLK at 144000000 Hz"),
     // Clocks of peripherals.
     wrong("GPIOB without clock", AHB1ENR, 1 << 1, 0, "GPIOB is accessed without its clock"),
@@ -167,6 +168,22 @@ pub(super) const STORES: &[Row] = &[
         1 << 21,
         "ADC channel 17 is sampled for",
     ),
+    wrong("pressure sampled for 3 cycles", ADC1 + 0x10, 0b111, 0, "ADC channel 0 is sampled for 166 ns"),
+    wrong(
+        "supply of the transducer sampled for 3 cycles",
+        ADC1 + 0x10,
+        0b111 << 3,
+        0,
+        "ADC channel 1 is sampled for 166 ns",
+    ),
+    wrong(
+        "thermistor sampled for 3 cycles",
+        ADC1 + 0x0C,
+        0b111 << 6,
+        0,
+        "ADC channel 12 is sampled for 166 ns",
+    ),
+    wrong("DMA to an odd address", DMA2 + 0x1C, 1, 1, "has an address that is no multiple of its width"),
     wrong("sensors of the chip off", ADC_CCR, 1 << 23, 0, "EMCY"),
     wrong("ADC without DMA", ADC1 + 0x08, 1 << 8, 0, "samples a second"),
     wrong("DMA of the ADC ends with a round", ADC1 + 0x08, 1 << 9, 0, "samples a second"),
@@ -207,12 +224,15 @@ pub(super) const STORES: &[Row] = &[
         .with(Node::LowSupply),
     missing("flash not unlocked", FLASH_KEYR, "a save is refused").with(Node::Saving),
     wrong("flash not in programming mode", FLASH_CR, 1 << 0, 0, "a save is refused").with(Node::Saving),
+    wrong("flash erased by double words", FLASH_CR, 0b11 << 8, 0b11 << 8, "a save is refused")
+        .with(Node::Saving),
     wrong("flash programmed by bytes", FLASH_CR, 0b11 << 8, 0, "a save is refused").with(Node::Saving),
     // Core.
     wrong("sampling not enabled in the NVIC", ISER1, 1 << (56 - 32), 0, "samples a second"),
     wrong("reception not enabled in the NVIC", ISER0, 0b11 << 20, 0, "no answer to SDO"),
     missing("floating-point unit off", CPACR, "CFSR 0x80000"),
     wrong("vector table elsewhere", VTOR, u32::MAX, 0x0804_0000, "fault at 0x"),
+    wrong("vector table at a multiple of 128", VTOR, 0x1FF, 0x80, "is not aligned to 512 bytes"),
     wrong("watchdog too fast", IWDG + 0x08, 0xFFF, 10, "reset by the chip (watchdog)"),
 ];
 
@@ -261,6 +281,20 @@ pub(super) const CODE: &[Row] = &[
     code("a supervisor call without a handler", SAMPLING, &[0xDF00], "reset by software"),
     // bkpt #0
     code("a breakpoint without a debugger", SAMPLING, &[0xBE00], "fault at 0x"),
+    // movw r0, #0xED10; movt r0, #0xE000; movs r1, #4; str r1, [r0]; wfi
+    code(
+        "a sleep that stops the clocks",
+        SAMPLING,
+        &[0xF64E, 0x5010, 0xF2CE, 0x0000, 0x2104, 0x6001, 0xBF30, 0xE7FE],
+        "SLEEPDEEP",
+    ),
+    // movw r0, #0xED9C; movt r0, #0xE000; movs r1, #0x10; str r1, [r0]; movs r1, #9; str r1, [r0, #4]
+    code(
+        "a guard of 32 bytes",
+        SAMPLING,
+        &[0xF64E, 0x509C, 0xF2CE, 0x0000, 0x2110, 0x6001, 0x2109, 0x6041, 0xE7FE],
+        "less than a kilobyte that protects data",
+    ),
     // bx lr
     code("a handler that clears nothing", RECEPTION, &[0x4770], "reset by the chip (watchdog)"),
     // movw r0, #0xED88; movt r0, #0xE000; movs r1, #0; str r1, [r0]; dsb; isb; vadd.f32 s0, s0, s0

@@ -94,7 +94,7 @@ impl From<PlanError> for Failure {
 
 /// The plan of a file, with the files that it names.
 fn load(path: &Path) -> Result<Plan, Failure> {
-    let bytes = input::read(path, LARGEST).map_err(|error| Failure::file(path, error))?;
+    let bytes = wire::input::read(path, LARGEST).map_err(|error| Failure::file(path, error))?;
     let text = String::from_utf8(bytes).map_err(|error| Failure::file(path, error))?;
     let file = File::parse(&text).map_err(|reason| Failure::file(path, reason))?;
     let folder = path.parent().unwrap_or(Path::new(""));
