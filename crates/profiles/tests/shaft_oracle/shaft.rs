@@ -339,11 +339,12 @@ impl<D: Device> World<D> {
         if self.random.one_in(4) {
             // One that creeps is seen when it has left its place by more than a step: some milliseconds later.
             let part = self.random.signed();
-            self.speed = part * self.fastest() + 4.0 * part.signum();
-            self.target = self.speed;
-            // A code beside it has the limits of a code.
+            // A code beside it has the limits of a code, which the first milliseconds count to as well.
             let has_code = self.case.any(SensorType::is_absolute);
-            return self.random.signed() * if has_code { part_of_code } else { 50_000.0 };
+            let (share, most) = if has_code { (0.4, 0.24 * self.code() as f64) } else { (1.0, 50_000.0) };
+            self.speed = share * part * self.fastest() + 4.0 * part.signum();
+            self.target = self.speed;
+            return self.random.signed() * most;
         }
         0.0
     }
