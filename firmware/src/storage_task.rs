@@ -6,9 +6,7 @@ use bsp::update_layout::LAYOUT;
 use bsp::{Clock, ParameterFlash, Watchdog, retained};
 use canopen::sdo::Abort;
 use canopen::{Duration, Instant};
-use node::{
-    MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict, log_event, stored_log,
-};
+use node::{MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict, log_event, stored_log};
 use profiles::board::RETAINED_WORDS;
 use update::{Clears, Event, Programs, Trial};
 

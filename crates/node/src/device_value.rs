@@ -121,11 +121,8 @@ mod tests {
     use super::*;
 
     const PAGES: Pages = Pages::new(0, 4 * 1024);
-    const EVENT: Event = Event {
-        outcome: Outcome::OnTrial,
-        version: Version { major: 1, minor: 2, patch: 3 },
-        generation: 0,
-    };
+    const EVENT: Event =
+        Event { outcome: Outcome::OnTrial, version: Version { major: 1, minor: 2, patch: 3 }, generation: 0 };
 
     fn store(flash: &mut [u8]) -> Store<Memory<&mut [u8]>> {
         Store::prepare(View::open(Memory(flash), PAGES).unwrap()).unwrap()

@@ -154,8 +154,9 @@ mod tests {
     fn the_longest_image_fits_where_it_runs_and_where_it_is_staged() {
         let (security, application) = (Area::new(0, &[2048]), Area::new(2048, &[1024, 2048]));
         let (short, long) = (Area::new(5120, &[2048, 1024]), Area::new(5120, &[2048, 2048]));
-        let longest =
-            |staging, kept| Layout::new(security, security, application, staging, kept).unwrap().longest_image();
+        let longest = |staging, kept| {
+            Layout::new(security, security, application, staging, kept).unwrap().longest_image()
+        };
         assert_eq!(longest(long, long), 3072);
         assert_eq!(longest(short, long), 2560, "the commit record takes 512");
         assert_eq!(longest(long, short), 2560, "the record of the kept image does so");

@@ -16,7 +16,14 @@ fn extent() -> Extent {
     if std::env::var("THOROUGH").is_ok_and(|value| value == "1") {
         Extent { every: 10, every_of_conditions: 10, every_of_loops: 200, flips: 4, pairs: None, boards: 2 }
     } else {
-        Extent { every: 400, every_of_conditions: 100, every_of_loops: 2000, flips: 1, pairs: None, boards: 1 }
+        Extent {
+            every: 400,
+            every_of_conditions: 100,
+            every_of_loops: 2000,
+            flips: 1,
+            pairs: None,
+            boards: 1,
+        }
     }
 }
 

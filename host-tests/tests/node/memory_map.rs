@@ -79,7 +79,8 @@ fn the_security_counter_has_a_sector_of_its_own() {
 #[test]
 fn the_regions_of_the_flash_do_not_overlap() {
     let regions = regions();
-    let order = ["BOOTLOADER", "PARAMETERS", "SECURITY", "WEAR", "IMAGE_HEADER", "APPLICATION", "STAGING", "KEPT"];
+    let order =
+        ["BOOTLOADER", "PARAMETERS", "SECURITY", "WEAR", "IMAGE_HEADER", "APPLICATION", "STAGING", "KEPT"];
     let mut next = FLASH;
     for name in order {
         assert!(regions[name].start >= next, "{name}");

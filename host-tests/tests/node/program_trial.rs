@@ -159,7 +159,9 @@ fn without_a_master_the_program_before_comes_back_in_time_or_the_new_one_is_conf
 
 #[test]
 fn a_master_ends_the_trial_by_command_and_gets_its_answer_first() {
-    for (word, then) in [(b"conf", Verdict::Confirm(Cause::Command)), (b"back", Verdict::TakeBack(Cause::Command))] {
+    for (word, then) in
+        [(b"conf", Verdict::Confirm(Cause::Command)), (b"back", Verdict::TakeBack(Cause::Command))]
+    {
         let mut bench = on_trial();
         assert_eq!(state(&mut bench), 1);
         bench.write(0x2002, COMMAND, word).unwrap();

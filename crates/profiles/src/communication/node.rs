@@ -81,8 +81,7 @@ pub const PROGRAM_STATE_ROWS: &[Object] = &[
 pub const UPDATE_LOG: u16 = 0x2006;
 
 /// 2006h: the last sixteen events of updates. docs/update.md describes an event.
-pub const UPDATE_LOG_ROW: Object =
-    Object::new(UPDATE_LOG, 0, "Update log", Type::Domain, Access::ReadOnly);
+pub const UPDATE_LOG_ROW: Object = Object::new(UPDATE_LOG, 0, "Update log", Type::Domain, Access::ReadOnly);
 
 /// Index of the object that counts lost events.
 pub const LOST_EVENTS: u16 = 0x2001;

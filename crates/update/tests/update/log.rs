@@ -108,7 +108,8 @@ fn a_power_cut_costs_at_most_the_reason() {
         } else {
             assert!(!is_staged);
             let events = outcomes(&log);
-            let no_update = |event: &(Outcome, u16)| matches!(event.0, Outcome::Installed | Outcome::BrokenOff);
+            let no_update =
+                |event: &(Outcome, u16)| matches!(event.0, Outcome::Installed | Outcome::BrokenOff);
             assert!(events.iter().all(no_update), "{events:?}");
         }
     }

@@ -8,8 +8,8 @@ use crate::bench::{
 use update::key::KeyList;
 use update::mock::{MockFlash, Weak};
 use update::{
-    Clears, Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial,
-    Updater, boot,
+    Clears, Crashes, Decision, Description, Programs, Proof, Reason, Refusal, Reset, Start, Status, Stay,
+    Trial, Updater, boot,
 };
 
 fn trial(flash: &mut MockFlash) -> Trial {
@@ -310,7 +310,10 @@ fn the_programs_in_the_flash_are_known_through_return_and_confirmation() {
     let mut flash = flash_with(&image_a(), 1);
     let known = |flash: &mut MockFlash| Programs::read(flash, &target().layout, Clears::default());
     let [a, b] = [image_a(), image_b()].map(|image| image.header.code_crc());
-    assert_eq!(known(&mut flash), Programs { staged: a, erases: 2, clears_allowed: 50, ..Programs::default() });
+    assert_eq!(
+        known(&mut flash),
+        Programs { staged: a, erases: 2, clears_allowed: 50, ..Programs::default() }
+    );
     update(&mut flash, &image_b().bytes()).unwrap();
     assert_eq!((known(&mut flash).staged, known(&mut flash).kept), (b, a));
     withdraw(&mut flash);
