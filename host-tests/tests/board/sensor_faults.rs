@@ -111,7 +111,10 @@ fn after_a_fault_the_first_pressure_that_is_valid_is_right() {
         assert!(ended - began > 1000 && ended + 1 < values.len(), "{fault}: {began} to {ended}");
         // The sample in which the fault begins is the mean of both.
         for (value, _) in &values[..began - 1] {
-            assert!((value - 2.5).abs() < 0.05, "{fault}, filter {filter}: {value} bar before the first invalid one");
+            assert!(
+                (value - 2.5).abs() < 0.05,
+                "{fault}, filter {filter}: {value} bar before the first invalid one"
+            );
         }
         for (value, status) in &values[ended + 1..] {
             assert!(

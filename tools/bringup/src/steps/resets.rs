@@ -112,7 +112,13 @@ fn lsi(bench: &mut Bench<'_>, time_out: f64) -> Result<()> {
     const WHAT: &str = "LSI by TIM5 (2005h)";
     let Some(hertz) = bench.start_test(WHAT, values::LSI)? else { return Ok(()) };
     let kilohertz = f64::from(hertz) / 1000.0;
-    bench.check_range(WHAT, kilohertz, LSI, "kHz", "Outside of the data sheet: another chip of the same type");
+    bench.check_range(
+        WHAT,
+        kilohertz,
+        LSI,
+        "kHz",
+        "Outside of the data sheet: another chip of the same type",
+    );
     let expected = 32.0 * NOMINAL / kilohertz.max(1.0);
     let range = (expected * 0.8, expected * 1.1);
     bench.check_range(
