@@ -73,25 +73,6 @@ def test_speed_gear_and_threshold_of_cia_406(node):
     assert (sdo[0x2112][1].raw, sdo[0x2113][1].raw) == (100, 0)
 
 
-@pytest.mark.parametrize("node", [("pressure", "--pressure", "sine:300000,50000,5")], indirect=True)
-def test_interrupt_delta_and_restart_of_the_extremes(node):
-    sdo = node.sdo
-    becomes(lambda: sdo[0x2212][1].raw - sdo[0x2211][1].raw, lambda bar: 0.9 < bar < 1.1)
-    received = []
-    node.network.subscribe(0x181, lambda _, data, __: received.append(bytes(data)))
-    # Type 255: with each change of 0.8 bar, twice in a period of 0.2 s. The temperature is in the same TPDO.
-    sdo[0x6133][1].raw, sdo[0x6133][2].raw = 0.8, 1000
-    node.network.nmt.send_command(1)
-    time.sleep(1)
-    received.clear()
-    time.sleep(2)
-    assert 10 <= len(received) <= 30, len(received)
-    refused(0x06090031, lambda: sdo.download(0x2213, 0, b"\x04"))
-    sdo[0x6131][1].raw = 0x00220000
-    sdo[0x2213].raw = 3
-    becomes(lambda: sdo[0x2211][1].raw, lambda pascal: 240000 < pascal < 360000)
-
-
 @pytest.mark.parametrize("node", [("encoder", "--shaft", "const:0.1")], indirect=True)
 def test_cams_across_zero_of_cia_406(node):
     sdo = node.sdo

@@ -261,7 +261,10 @@ impl Object {
         self.with(Rule::StoreCalibration)
     }
 
-    const fn with(mut self, rule: Rule) -> Object {
+    /// The row with this rule, for tables that are made at run time out of a data sheet.
+    #[doc(hidden)]
+    #[must_use]
+    pub const fn with(mut self, rule: Rule) -> Object {
         self.rule = rule;
         self
     }

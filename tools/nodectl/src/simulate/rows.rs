@@ -116,7 +116,7 @@ impl Rows {
             return self.note(key, "left out: the data type is unknown");
         };
         let mut row = Object::new(entry.index, entry.sub, "", kind, access(entry.access));
-        if row.rule.size().is_some_and(|size| size != kind.size()) {
+        if row.rule().size().is_some_and(|size| size != kind.size()) {
             return self.note(key, "left out: the data type is not that of CiA 301");
         }
         row.default = default(formula, kind, node, row.default);
@@ -125,8 +125,8 @@ impl Rows {
         row.group = Some(group(entry.index)).filter(|_| stores && is_stored(entry, &row));
         match (entry.index, entry.sub) {
             // The simulated device has no program.
-            (0x1F51, 1) => row.rule = Rule::Application,
-            (0x1005, 0) => row.rule = Rule::SyncProducer,
+            (0x1F51, 1) => row = row.with(Rule::Application),
+            (0x1005, 0) => row = row.with(Rule::SyncProducer),
             _ => (),
         }
         if let (Type::OctetString(_), Some(value)) = (kind, value) {
@@ -148,7 +148,7 @@ impl Rows {
         if !self.rows.contains_key(&(0x1006, 0))
             && let Some(sync) = self.rows.get_mut(&(0x1005, 0))
         {
-            sync.rule = Rule::SyncCobId;
+            *sync = sync.with(Rule::SyncCobId);
             sync.default = match sync.default {
                 DefaultValue::Integer(value) => DefaultValue::Integer(value & !(1 << 30)),
                 other => other,
@@ -275,8 +275,8 @@ fn is_within(default: DefaultValue, (low, high): (i64, i64)) -> bool {
 fn mapping(entry: &Entry, row: &Object) -> Mapping {
     let fits = (1..=8).contains(&row.kind.size());
     let is_sent =
-        fits && entry.is_tpdo_mappable() && !matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
-    let is_received = fits && entry.is_rpdo_mappable() && matches!(row.rule, Rule::Plain);
+        fits && entry.is_tpdo_mappable() && !matches!(row.rule(), Rule::ErrorCount | Rule::ErrorEntry);
+    let is_received = fits && entry.is_rpdo_mappable() && matches!(row.rule(), Rule::Plain);
     match (is_sent, is_received) {
         (true, true) => Mapping::Both,
         (true, false) => Mapping::Tpdo,
@@ -287,7 +287,7 @@ fn mapping(entry: &Entry, row: &Object) -> Mapping {
 
 /// Whether the device stores a value with 1010h: a parameter, no process value and no command.
 fn is_stored(entry: &Entry, row: &Object) -> bool {
-    let is_command = row.rule.is_command() || matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
+    let is_command = row.rule().is_command() || matches!(row.rule(), Rule::ErrorCount | Rule::ErrorEntry);
     let has_value = !matches!(entry.data_type.class(), Class::Bytes | Class::Text);
     row.access == RowAccess::ReadWrite && has_value && !is_command && !entry.is_rpdo_mappable()
 }
