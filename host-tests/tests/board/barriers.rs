@@ -1,4 +1,5 @@
-//! The barriers and the read-back of the images, taken out one after the other: what the emulated board says without each.
+//! The barriers and the read-back of the images, taken out one after the other: what the emulated board says without
+//! each.
 //! Stores take their time to the peripherals only with `--interleave`.
 
 use canbus::Time;
