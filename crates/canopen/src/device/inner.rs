@@ -238,6 +238,8 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::EMCY) {
             let _ = self.emcy.configure(self.number_or(0x1014, 0, emcy::OFF));
             self.emcy.set_inhibit(low_half(self.number(0x1015, 0)), now);
+            let errors = (1..=emcy::HISTORY).take_while(|&sub| self.dictionary.find(0x1003, sub).is_ok());
+            self.emcy.set_history_depth(errors.last().unwrap_or(0));
         }
         if Self::has(Services::HEARTBEAT_CONSUMER) {
             self.configure_watches(now);

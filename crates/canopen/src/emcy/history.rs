@@ -1,12 +1,14 @@
 //! The pre-defined error field, object 1003h.
 
-/// The number of errors in the list.
-const DEPTH: u8 = 10;
+/// The most errors in the list.
+pub(crate) const DEPTH: u8 = 10;
 
 /// The last errors, each in the four bytes of an SDO upload.
 #[derive(Debug)]
 pub(crate) struct History {
     count: u8,
+    /// The number of errors that the dictionary has entries for.
+    depth: u8,
     /// Position of the newest error in the ring buffer. Older errors precede it.
     newest: u8,
     errors: [[u8; 4]; DEPTH as usize],
@@ -14,7 +16,7 @@ pub(crate) struct History {
 
 impl History {
     pub(crate) const fn new() -> History {
-        History { count: 0, newest: 0, errors: [[0; 4]; DEPTH as usize] }
+        History { count: 0, depth: DEPTH, newest: 0, errors: [[0; 4]; DEPTH as usize] }
     }
 
     /// Adds an error: its code, and two bytes of its error field.
@@ -23,7 +25,12 @@ impl History {
         if let Some(place) = self.errors.get_mut(usize::from(self.newest)) {
             *place = error;
         }
-        self.count = (self.count + 1).min(DEPTH);
+        self.count = (self.count + 1).min(self.depth);
+    }
+
+    /// Takes the number of entries of the dictionary, at most ten.
+    pub(crate) fn set_depth(&mut self, depth: u8) {
+        self.depth = depth;
     }
 
     pub(crate) fn clear(&mut self) {
@@ -57,5 +64,13 @@ mod tests {
         assert_eq!(history.error(0), None);
         history.clear();
         assert_eq!((*history.count(), history.error(1)), (0, None));
+    }
+
+    #[test]
+    fn a_list_of_two_has_two_errors() {
+        let mut history = History::new();
+        history.set_depth(2);
+        (1..=12).for_each(|code| history.push([code, 0, 1, 2]));
+        assert_eq!((*history.count(), history.error(2), history.error(3)), (2, Some(&[11, 0, 1, 2]), None));
     }
 }

@@ -7,5 +7,6 @@ mod producer;
 
 use fault::FaultSet;
 pub use fault::{Condition, ErrorClass, Fault};
+pub(crate) use history::DEPTH as HISTORY;
 pub use message::Message;
 pub(crate) use producer::{OFF, Producer};

@@ -239,6 +239,11 @@ impl Producer {
         &self.history
     }
 
+    /// Takes the number of entries of 1003h.
+    pub(crate) fn set_history_depth(&mut self, depth: u8) {
+        self.history.set_depth(depth);
+    }
+
     pub(crate) fn clear_history(&mut self) {
         self.history.clear();
     }

@@ -68,3 +68,17 @@ fn an_emcy_has_the_error_field_of_the_moment_after_a_reset_too() {
         sent.0.iter().filter(|frame| frame.id() == 0x085).map(|frame| frame.data()[3..7].to_vec()).collect();
     assert_eq!(again, [[3, 7, 0x78, 0x56], [0; 4]]);
 }
+
+#[test]
+fn the_number_of_errors_is_at_most_that_of_the_entries_of_1003h() {
+    let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Channels { channel: 3, value: 0x1234 });
+    let _ = node.start(Instant(0), &mut Sent::default());
+    for at in 1..=6 {
+        let _ = node.set_condition(0, true, Instant(2 * at));
+        let _ = emcys(&mut node, Instant(2 * at));
+        let _ = node.set_condition(0, false, Instant(2 * at + 1));
+        let _ = emcys(&mut node, Instant(2 * at + 1));
+    }
+    assert_eq!(listed(&mut node, 0), [4]);
+    assert_eq!(listed(&mut node, 4), [0x10, 0x23, 3, 7]);
+}

@@ -130,10 +130,13 @@ impl Transmitter {
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
         let is_check = self.until_check == 0;
         self.until_check = if is_check { SAMPLES_PER_SECOND } else { self.until_check } - 1;
-        let is_rail = raw.is_rail(raw.pressure);
-        let is_break = self.calibration.pressure.is_break(ratio);
-        if is_check || !self.is_well || is_rail || is_break || has_no_temperature {
-            self.judge(is_check, is_break, is_rail, has_no_temperature);
+        let seen = Conditions {
+            sensor_break: self.calibration.pressure.is_break(ratio),
+            pressure_rail: raw.is_rail(raw.pressure),
+            temperature_rail: has_no_temperature,
+        };
+        if is_check || !self.is_well || seen != Conditions::default() {
+            self.judge(is_check, seen);
         }
         self.conditions
     }
@@ -141,15 +144,16 @@ impl Transmitter {
     // Most samples are good ones, and their processing time is short.
     #[cold]
     #[inline(never)]
-    fn judge(&mut self, is_check: bool, is_break: bool, is_rail: bool, has_no_temperature: bool) {
-        let pressure_holds = self.pressure.is_faulty(is_break || is_rail);
-        let temperature_holds = self.temperature.is_faulty(has_no_temperature);
+    fn judge(&mut self, is_check: bool, seen: Conditions) {
+        let pressure_holds = self.pressure.is_faulty(seen.sensor_break || seen.pressure_rail);
+        let temperature_holds = self.temperature.is_faulty(seen.temperature_rail);
         let before = self.conditions;
         if is_check {
-            self.conditions.sensor_break = is_break || before.sensor_break && pressure_holds;
+            self.conditions.sensor_break = seen.sensor_break || before.sensor_break && pressure_holds;
         }
-        self.conditions.pressure_rail = is_rail || before.pressure_rail && pressure_holds;
-        self.conditions.temperature_rail = has_no_temperature || before.temperature_rail && temperature_holds;
+        self.conditions.pressure_rail = seen.pressure_rail || before.pressure_rail && pressure_holds;
+        self.conditions.temperature_rail =
+            seen.temperature_rail || before.temperature_rail && temperature_holds;
         self.is_pressure_held = pressure_holds;
         self.is_well = self.conditions == Conditions::default() && !pressure_holds && !temperature_holds;
     }

@@ -144,7 +144,7 @@ fn a_used_up_budget_refuses_a_clear_without_an_effect() {
         node.clear().unwrap();
         node.reset();
     }
-    let before = node.updater.flash().bytes().to_vec();
+    let before = node.updater.flash().bytes();
     assert_eq!(node.clear(), Err(Refusal::Worn));
     assert_eq!(node.updater.status(), Status::refused(Refusal::Worn));
     assert_eq!(node.updater.flash().bytes(), before);
