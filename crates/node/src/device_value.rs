@@ -43,14 +43,14 @@ impl DeviceValue {
     pub(crate) fn view<F: ReadNorFlash>(view: &mut View<F>) -> DeviceValue {
         let mut bytes: Bytes = [0; DeviceRecord::ROOM];
         let loaded = view.load(DeviceRecord::NUMBER, &mut bytes);
-        DeviceValue::decode(loaded, &bytes)
+        DeviceValue::decode(&loaded, &bytes)
     }
 
     /// The value as stored now.
     pub(crate) fn read<F: NorFlash>(store: &mut Store<F>) -> DeviceValue {
         let mut bytes: Bytes = [0; DeviceRecord::ROOM];
         let loaded = store.load(DeviceRecord::NUMBER, &mut bytes);
-        DeviceValue::decode(loaded, &bytes)
+        DeviceValue::decode(&loaded, &bytes)
     }
 
     /// Whether a device record is stored, valid or not.
@@ -59,12 +59,12 @@ impl DeviceValue {
     }
 
     #[inline(never)]
-    fn decode<E>(loaded: Result<Option<Loaded>, Error<E>>, bytes: &Bytes) -> DeviceValue {
+    fn decode<E>(loaded: &Result<Option<Loaded>, Error<E>>, bytes: &Bytes) -> DeviceValue {
         let Ok(Some(Loaded { version: DeviceRecord::VERSION, len })) = loaded else {
             return DeviceValue::EMPTY;
         };
         let (device, rest) = bytes.split_first_chunk().unwrap_or((&NONE, &[]));
-        let (log, positions) = match len {
+        let (log, positions) = match *len {
             WITH_LOG | WHOLE => rest.split_at_checked(Log::LEN).unwrap_or_default(),
             _ => (&[][..], rest),
         };

@@ -60,6 +60,9 @@ pub(crate) fn memory(
     Memory { flash: firmware.flash_size, bootloader_flash, ram: firmware.ram_size, stack }
 }
 
+/// The content of the unused stack of a development image, which it fills at its start (crates/bsp, `start_tests`).
+const UNUSED: u32 = 0xA5C3_965A;
+
 fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
     let bottom = machine.model().ram.start;
     let mut stack = vec![0; start.saturating_sub(bottom) as usize];
@@ -67,7 +70,14 @@ fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
         return 0;
     }
     let before = machine.ram_at_power_on();
-    let untouched = stack.iter().zip(before).take_while(|(now, before)| now == before).count();
+    let marked = UNUSED.to_le_bytes().into_iter().cycle();
+    let is_unused = |((now, before), marked): &((&u8, &u8), u8)| now == before || *now == marked;
+    let untouched = stack
+        .iter()
+        .zip(before)
+        .zip(marked)
+        .take_while(|(pair, marked)| is_unused(&(*pair, *marked)))
+        .count();
     (stack.len() - untouched) as u32
 }
 

@@ -94,12 +94,13 @@ fn a_parameter_selects_the_sensor_of_the_chip_or_the_thermistor() {
 #[test]
 fn a_broken_thermistor_is_reported() {
     const EMCY: u16 = 0x081;
-    let mut world = world("--bitrate 1000 --fault open-thermistor@2..3 --fault shorted-thermistor@4..5");
+    // A fault that recurs within 2 s would last a second longer.
+    let mut world = world("--bitrate 1000 --fault open-thermistor@2..3 --fault shorted-thermistor@6..7");
     let master = Master::join(&mut world);
     world.run_until(SECOND);
     write(&mut world, &master, LOCK, 4, u32::from_le_bytes(*b"cali"));
     write(&mut world, &master, THERMOMETER, 1, 1);
-    for (millis, is_broken) in [(1500, false), (2500, true), (3500, false), (4500, true), (5500, false)] {
+    for (millis, is_broken) in [(1500, false), (2500, true), (3500, false), (6500, true), (7500, false)] {
         master.heard(&mut world, EMCY);
         world.run_until(Time::from_millis(millis));
         let codes: Vec<_> =

@@ -74,7 +74,8 @@ pub const PROGRAM_STATE_ROWS: &[Object] = &[
     fact(4, "Downloaded program", Type::Unsigned32),
     fact(5, "Kept program", Type::Unsigned32),
     fact(6, "Sector erases", Type::Unsigned16),
-    fact(7, "Clears allowed", Type::Unsigned8),
+    // The budget of `update` after power-on.
+    fact(7, "Clears allowed", Type::Unsigned8).value(50),
 ];
 
 /// Index of the log of updates.

@@ -96,6 +96,7 @@ impl PressureCalibration {
 
     /// Whether the ratio is outside the range of an intact sensor.
     #[must_use]
+    #[inline]
     pub fn is_break(&self, ratio: f32) -> bool {
         ratio < self.break_low || ratio > self.break_high
     }

@@ -130,12 +130,11 @@ impl Transmitter {
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
         let is_check = self.until_check == 0;
         self.until_check = if is_check { SAMPLES_PER_SECOND } else { self.until_check } - 1;
-        let seen = Conditions {
-            sensor_break: self.calibration.pressure.is_break(ratio),
-            pressure_rail: raw.is_rail(raw.pressure),
-            temperature_rail: has_no_temperature,
-        };
-        if is_check || !self.is_well || seen != Conditions::default() {
+        let sensor_break = self.calibration.pressure.is_break(ratio);
+        let pressure_rail = raw.is_rail(raw.pressure);
+        #[allow(clippy::needless_bitwise_bool, reason = "four branches take longer")]
+        if is_check | !self.is_well | pressure_rail | sensor_break | has_no_temperature {
+            let seen = Conditions { sensor_break, pressure_rail, temperature_rail: has_no_temperature };
             self.judge(is_check, seen);
         }
         self.conditions

@@ -217,11 +217,11 @@ mod tests {
         let format: SsiFormat = "0+4,binary,error,odd".parse().unwrap();
         let ssi = Ssi::new(format);
         assert_eq!(format.length(), 6);
-        // Three steps of 16.
+        // Three steps of 16 in four bits, then the error bit and the parity.
         let three = Reading { revolutions: 3.0 / 16.0, ..Reading::default() };
-        assert_eq!(ssi.encode(three), 0b0011_0_1);
-        assert_eq!(ssi.encode(Reading { has_error: true, ..three }), 0b0011_1_0);
-        assert_eq!(ssi.encode(Reading { is_disturbed: true, ..three }), 0b0011_0_0);
+        assert_eq!(ssi.encode(three), 0b00_1101);
+        assert_eq!(ssi.encode(Reading { has_error: true, ..three }), 0b00_1110);
+        assert_eq!(ssi.encode(Reading { is_disturbed: true, ..three }), 0b00_1100);
     }
 
     #[test]

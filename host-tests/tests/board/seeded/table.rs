@@ -220,8 +220,7 @@ pub(super) const STORES: &[Row] = &[
     missing("flags of DMA1 are not cleared", DMA1 + 0x08, "stream 3 of DMA1 begins with flags")
         .with(Node::Absolute),
     // Flash.
-    wrong("voltage detector off", PWR_CR, 1 << 4, 0, "the flash is changed by words at 26")
-        .with(Node::LowSupply),
+    wrong("voltage detector off", PWR_CR, 1 << 4, 0, "what was saved is lost").with(Node::LowSupply),
     missing("flash not unlocked", FLASH_KEYR, "a save is refused").with(Node::Saving),
     wrong("flash not in programming mode", FLASH_CR, 1 << 0, 0, "a save is refused").with(Node::Saving),
     wrong("flash erased by double words", FLASH_CR, 0b11 << 8, 0b11 << 8, "a save is refused")
