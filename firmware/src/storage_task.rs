@@ -122,14 +122,17 @@ impl StorageTask {
         let Some(verdict) = node.call(|protocol, _| protocol.verdict()) else { return };
         let Some(memory) = &mut self.memory else { return };
         let mut records = memory.store().flash().trial();
+        // The decision first: a power cut may take its cause, but not the decision.
         let is_done = match verdict {
             Verdict::Confirm(cause) => {
+                let is_done = Trial::confirm(&mut records, &LAYOUT).is_ok();
                 cause.note(&mut records, &LAYOUT);
-                Trial::confirm(&mut records, &LAYOUT).is_ok()
+                is_done
             }
             Verdict::TakeBack(cause) => {
+                let is_done = Trial::withdraw(&mut records, &LAYOUT).is_ok();
                 cause.note(&mut records, &LAYOUT);
-                Trial::withdraw(&mut records, &LAYOUT).is_ok()
+                is_done
             }
         };
         match verdict {

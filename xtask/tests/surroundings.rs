@@ -217,7 +217,11 @@ fn with_a_board_both_programs_are_built() {
     assert!(says.contains("cannot start") && says.contains("flash"), "{says}");
     let calls = machine.calls("cargo");
     let builds = |what: &str| calls.iter().filter(|call| call.contains(what)).count();
-    assert_eq!((builds("-p flash"), builds("-p firmware"), builds("-p bootloader")), (1, 1, 1), "{calls:?}");
+    assert_eq!(
+        (builds("-p programmer"), builds("-p firmware"), builds("-p bootloader")),
+        (1, 1, 1),
+        "{calls:?}"
+    );
 }
 
 /// As the runner of `cargo run`, the command gets the path of the application.

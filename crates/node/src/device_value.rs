@@ -69,7 +69,7 @@ impl DeviceValue {
             _ => (&[][..], rest),
         };
         let positions = positions.first_chunk().copied();
-        let has_positions = matches!(len, WITHOUT_LOG | WHOLE);
+        let has_positions = matches!(*len, WITHOUT_LOG | WHOLE);
         DeviceValue {
             device: *device,
             log: Log::from_bytes(log),

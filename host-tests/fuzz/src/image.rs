@@ -11,8 +11,8 @@ use update::{
 };
 
 /// Sectors: security counter; application in two sectors; staging in two; the kept image in two.
-const SECTORS: [usize; 7] = [1280, 512, 512, 512, 1024, 512, 1024];
-const APPLICATION: usize = 1280;
+const SECTORS: [usize; 7] = [1536, 512, 512, 512, 1024, 512, 1024];
+const APPLICATION: usize = 1536;
 const BOARD: u32 = 0x8271;
 /// Number of polls that no step of an update exceeds.
 const POLLS: u32 = 2000;
@@ -70,13 +70,13 @@ fn keys() -> salty::Keypair {
 static PUBLIC_KEYS: LazyLock<[[u8; 32]; 3]> = LazyLock::new(|| [keys().public.to_bytes(); 3]);
 
 fn target() -> Target {
-    let application = Area::new(1280, &[512, 512]);
+    let application = Area::new(1536, &[512, 512]);
     let layout = Layout::new(
-        Area::new(0, &[1280]),
-        Area::new(5376, &[512]),
+        Area::new(0, &[1536]),
+        Area::new(5632, &[512]),
         application,
-        Area::new(2304, &[512, 1024]),
-        Area::new(3840, &[512, 1024]),
+        Area::new(2560, &[512, 1024]),
+        Area::new(4096, &[512, 1024]),
     );
     Target { layout: layout.expect("they fit"), board: BOARD, hardware: 0, keys: &PUBLIC_KEYS }
 }

@@ -95,8 +95,8 @@ pub(super) const MENDS: &[Mend] = &[
         rule: "heartbeat-late",
         scenario: "starving::event_timers_of_a_millisecond_on_all_tpdos_of_a_lift_leave_room",
         edits: &[Edit {
-            file: "crates/canopen/src/pdo/context.rs",
-            mended: "self.room() > ROOM_FOR_OTHERS && self.budget.admits(id, len, self.now)",
+            file: "crates/canopen/src/pdo/budget.rs",
+            mended: "self.room() > ROOM_FOR_OTHERS && self.admits(id, len)",
             fault: "self.room() > ROOM_FOR_OTHERS",
         }],
     },

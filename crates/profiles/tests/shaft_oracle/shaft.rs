@@ -378,11 +378,11 @@ impl<D: Device> World<D> {
         sensors.iter().for_each(|kind| self.tally.row(*kind, reset).resets += 1);
         self.run(5);
         let steps = self.steps();
-        for at in 0..2 {
+        for (at, kind) in kinds.into_iter().enumerate() {
             let Some(anchor) = self.anchors[at] else { continue };
             if self.shown[at].is_condemned {
                 let is_right = self.error(at, anchor.expected(steps)) <= self.tolerance(at);
-                let row = self.tally.row(kinds[at], reset);
+                let row = self.tally.row(kind, reset);
                 row.condemned += 1;
                 row.condemned_right += u32::from(is_right);
             }

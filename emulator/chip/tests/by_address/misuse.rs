@@ -163,7 +163,7 @@ fn start(rig: &mut Rig, micros: u64) {
 }
 
 fn sample(rig: &mut Rig, channel: u32, wrong: bool) {
-    adc(rig, channel, if wrong { 0 } else { 1 });
+    adc(rig, channel, u32::from(!wrong));
     rig.write(CR2, ADON);
     rig.wait(Time::from_micros(4));
     rig.write(CR2, ADON | SWSTART);

@@ -1,8 +1,6 @@
 //! The bootloader as built by its owner: release key, root key and recovery key, without the feature `development`.
 
 use ed25519_dalek::{SigningKey, VerifyingKey};
-use host_tests::watch::expects;
-use monitor::Rule;
 use programmer::sign::image::Image;
 use programmer::sign::{key, key_list};
 use update::Description;
@@ -131,7 +129,6 @@ fn a_stolen_root_key_is_revoked_in_the_field() {
 /// The release key raises the security counter by 16 with an image.
 #[test]
 fn the_release_key_raises_the_counter_by_a_bounded_step() {
-    let _expected = expects([Rule::SdoProtocol]);
     let mut bench = bench();
     let image = version_a();
     let about = Description { counter: 17, ..image.header.description() };
