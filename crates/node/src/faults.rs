@@ -120,7 +120,7 @@ mod tests {
         let mut shown = Shown::default();
         for _ in 0..3 {
             assert_eq!(shown.update(1), 1);
-            let end = (1..).find(|_| shown.update(0) == 1);
+            let end = (1..=MEMORY).find(|_| shown.update(0) == 1);
             assert_eq!(end, Some(HOLD));
             assert!((0..MEMORY).all(|_| shown.update(0) == 0));
         }

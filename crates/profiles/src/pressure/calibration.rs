@@ -94,9 +94,15 @@ impl PressureCalibration {
         if drifts.iter().any(|drift| *drift != 0.0) { super::STATUS_UNCOMPENSATED } else { 0 }
     }
 
+    /// The middle of the range of an intact sensor, and a little less than half of its width: a ratio that is nearer to the
+    /// middle is no break. One comparison is quicker than two.
+    #[must_use]
+    pub fn intact(&self) -> (f32, f32) {
+        (f32::midpoint(self.break_low, self.break_high), 0.499 * (self.break_high - self.break_low))
+    }
+
     /// Whether the ratio is outside the range of an intact sensor.
     #[must_use]
-    #[inline]
     pub fn is_break(&self, ratio: f32) -> bool {
         ratio < self.break_low || ratio > self.break_high
     }

@@ -78,6 +78,8 @@ pub struct Transmitter {
     pressure: Channel,
     temperature: Channel,
     conditions: Conditions,
+    /// The range of an intact sensor, as a middle and half of a width.
+    intact: (f32, f32),
     /// The pressure comes from a faulty sensor, or its filter contains such a sample.
     is_pressure_held: bool,
     /// No fault is present, and no filter contains a sample taken during a fault.
@@ -97,6 +99,7 @@ impl Transmitter {
             pressure: Channel::new(&parameters.pressure),
             temperature: Channel::new(&parameters.temperature),
             conditions: Conditions::default(),
+            intact: parameters.calibration.pressure.intact(),
             is_pressure_held: false,
             is_well: true,
             until_check: 0,
@@ -115,8 +118,7 @@ impl Transmitter {
         let kelvin = self.calibration.temperature.temperature(raw, self.chip);
         let conditions = self.check(raw, ratio, kelvin.is_none());
         let pressure = self.calibration.pressure.pressure(ratio, kelvin);
-        let is_valid = !conditions.sensor_break && !self.is_pressure_held;
-        snapshot.pressure = self.pressure.sample(pressure, is_valid);
+        snapshot.pressure = self.pressure.sample(pressure, !self.is_pressure_held);
         if kelvin.is_none() {
             snapshot.pressure.status |= self.calibration.pressure.uncompensated();
         }
@@ -128,12 +130,13 @@ impl Transmitter {
     /// The faults of the sensors. A fault lasts until the filter behind the sensor is full of good samples. A ratio that no
     /// intact sensor gives makes the value invalid at once; the break is reported with the next check.
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
-        let is_check = self.until_check == 0;
-        self.until_check = if is_check { SAMPLES_PER_SECOND } else { self.until_check } - 1;
-        let sensor_break = self.calibration.pressure.is_break(ratio);
+        let (left, is_check) = self.until_check.overflowing_sub(1);
+        self.until_check = left;
         let pressure_rail = raw.is_rail(raw.pressure);
-        #[allow(clippy::needless_bitwise_bool, reason = "four branches take longer")]
-        if is_check | !self.is_well | pressure_rail | sensor_break | has_no_temperature {
+        let (middle, width) = self.intact;
+        if (ratio - middle).abs() > width || pressure_rail || is_check || has_no_temperature || !self.is_well
+        {
+            let sensor_break = self.calibration.pressure.is_break(ratio);
             let seen = Conditions { sensor_break, pressure_rail, temperature_rail: has_no_temperature };
             self.judge(is_check, seen);
         }
@@ -148,6 +151,7 @@ impl Transmitter {
         let temperature_holds = self.temperature.is_faulty(seen.temperature_rail);
         let before = self.conditions;
         if is_check {
+            self.until_check = SAMPLES_PER_SECOND - 1;
             self.conditions.sensor_break = seen.sensor_break || before.sensor_break && pressure_holds;
         }
         self.conditions.pressure_rail = seen.pressure_rail || before.pressure_rail && pressure_holds;
@@ -168,6 +172,7 @@ impl Chain for Transmitter {
 
     fn apply(&mut self, parameters: &Parameters) {
         self.calibration = parameters.calibration;
+        self.intact = parameters.calibration.pressure.intact();
         self.pressure.apply(&parameters.pressure);
         self.temperature.apply(&parameters.temperature);
     }
