@@ -95,10 +95,12 @@ impl PressureCalibration {
     }
 
     /// The middle of the range of an intact sensor, and a little less than half of its width: a ratio that is nearer to the
-    /// middle is no break. One comparison is quicker than two.
+    /// middle is no break, and no input at a rail, which has a ratio of 0, or of 1 and more. One comparison is quicker
+    /// than four.
     #[must_use]
     pub fn intact(&self) -> (f32, f32) {
-        (f32::midpoint(self.break_low, self.break_high), 0.499 * (self.break_high - self.break_low))
+        let (low, high) = (self.break_low.max(0.0), self.break_high.min(1.0));
+        (f32::midpoint(low, high), 0.499 * (high - low))
     }
 
     /// Whether the ratio is outside the range of an intact sensor.

@@ -132,11 +132,10 @@ impl Transmitter {
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
         let (left, is_check) = self.until_check.overflowing_sub(1);
         self.until_check = left;
-        let pressure_rail = raw.is_rail(raw.pressure);
         let (middle, width) = self.intact;
-        if (ratio - middle).abs() > width || pressure_rail || is_check || has_no_temperature || !self.is_well
-        {
+        if (ratio - middle).abs() > width || is_check || has_no_temperature || !self.is_well {
             let sensor_break = self.calibration.pressure.is_break(ratio);
+            let pressure_rail = raw.is_rail(raw.pressure);
             let seen = Conditions { sensor_break, pressure_rail, temperature_rail: has_no_temperature };
             self.judge(is_check, seen);
         }
