@@ -8,6 +8,8 @@ export class Bus extends EventTarget {
     this.status = null;
     this.nodes = new Map();
     this.chosen = null;
+    // The node to choose again when it comes back.
+    this.wanted = null;
     this.faults = [];
     connection.on("hello", (hello) => this.#greet(hello));
     connection.on("status", (status) => this.#update("status", status));
@@ -36,7 +38,9 @@ export class Bus extends EventTarget {
   }
 
   choose(node) {
-    if (node === this.chosen || !this.nodes.has(node)) return;
+    if (!this.nodes.has(node)) return;
+    this.wanted = node;
+    if (node === this.chosen) return;
     this.chosen = node;
     this.#tell("chosen");
   }
@@ -60,7 +64,9 @@ export class Bus extends EventTarget {
     if (all) this.nodes.clear();
     for (const node of nodes) this.nodes.set(node.node, node);
     const before = this.chosen;
-    if (!this.nodes.has(before)) this.chosen = this.list()[0]?.node ?? null;
+    if (this.nodes.has(this.wanted)) this.chosen = this.wanted;
+    else if (!this.nodes.has(before)) this.chosen = this.list()[0]?.node ?? null;
+    this.wanted ??= this.chosen;
     this.#tell("nodes");
     if (this.chosen !== before) this.#tell("chosen");
   }
