@@ -195,12 +195,12 @@ pub(super) const MENDS: &[Mend] = &[
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
                 mended: "            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
-                fault: "            self.history.push(fault.condition(self.conditions).code, [0; 2]);\n            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
+                fault: "            { let [low, high] = fault.condition(self.conditions).code.to_le_bytes(); self.history.push([low, high, 0, 0]); }\n            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
             },
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
-                mended: "self.history.push(message.code, if lists_detail { [first, second] } else { [0; 2] });",
-                fault: "let _ = (first, second, lists_detail);",
+                mended: "self.history.push([low, high, detail[0], detail[1]]);",
+                fault: "let _ = detail;",
             },
         ],
     },
