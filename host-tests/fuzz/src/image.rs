@@ -11,7 +11,7 @@ use update::{
 };
 
 /// Sectors: security counter; application in two sectors; staging in two; the kept image in two.
-const SECTORS: [usize; 7] = [1536, 512, 512, 512, 1024, 512, 1024];
+const SECTORS: [usize; 8] = [1536, 512, 512, 512, 1024, 512, 1024, 512];
 const APPLICATION: usize = 1536;
 const BOARD: u32 = 0x8271;
 /// Number of polls that no step of an update exceeds.
