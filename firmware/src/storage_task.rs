@@ -122,19 +122,14 @@ impl StorageTask {
         let Some(verdict) = node.call(|protocol, _| protocol.verdict()) else { return };
         let Some(memory) = &mut self.memory else { return };
         let mut records = memory.store().flash().trial();
-        // The decision first: a power cut may take its cause, but not the decision.
-        let is_done = match verdict {
-            Verdict::Confirm(cause) => {
-                let is_done = Trial::confirm(&mut records, &LAYOUT).is_ok();
-                cause.note(&mut records, &LAYOUT);
-                is_done
-            }
-            Verdict::TakeBack(cause) => {
-                let is_done = Trial::withdraw(&mut records, &LAYOUT).is_ok();
-                cause.note(&mut records, &LAYOUT);
-                is_done
-            }
+        let (cause, outcome) = match verdict {
+            Verdict::Confirm(cause) => (cause, Trial::confirm(&mut records, &LAYOUT)),
+            Verdict::TakeBack(cause) => (cause, Trial::withdraw(&mut records, &LAYOUT)),
         };
+        let is_done = outcome.is_ok();
+        if is_done {
+            cause.note(&mut records, &LAYOUT);
+        }
         match verdict {
             // The next run tries again.
             _ if !is_done => defmt::error!("the trial of this program cannot be ended"),

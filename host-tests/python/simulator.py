@@ -48,6 +48,9 @@ class Simulator:
         self.is_new = "--flash" not in flags
         self.expected: set[str] = set()
         self.is_judged = False
+        if "--threads" not in flags:
+            # As many tests as cores run at a time.
+            command += ["--threads", "1"]
         command += ["--page-program", os.environ["NODECTL_COMMAND"], *(["--page", page] if page else ["--no-page"])]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)

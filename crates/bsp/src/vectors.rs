@@ -2,6 +2,9 @@
 
 use core::ops::Range;
 
+/// The content of a word of the stack that a development image has never used: it fills its stack at its start.
+pub const UNUSED_STACK: u32 = 0xA5C3_965A;
+
 /// Initial stack pointer and entry of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vectors {

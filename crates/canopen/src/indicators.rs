@@ -7,7 +7,7 @@ const FLICKER: u64 = 50_000;
 const FLASH: u64 = 200_000;
 const PAUSE: u64 = 1_000_000;
 
-/// What an indicator shows.
+/// The pattern of an indicator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Pattern {

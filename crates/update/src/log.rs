@@ -70,7 +70,8 @@ impl Cause {
         Cause::ALL.into_iter().find(|cause| *cause as u8 == code).unwrap_or_default()
     }
 
-    /// Notes the cause in front of [`Trial::confirm`] or [`Trial::withdraw`].
+    /// Notes the cause. To be called after [`Trial::confirm`] or [`Trial::withdraw`]: a power cut between the two may take the
+    /// cause, but not the decision.
     pub fn note<F: Flash>(self, flash: &mut F, layout: &Layout) {
         let code = self as u8;
         program_once(flash, layout, CAUSE, [code, !code, code, !code]);

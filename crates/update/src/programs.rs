@@ -8,7 +8,7 @@ use crate::security::Security;
 use crate::wear;
 
 /// The programs of a node. A number is 0 where the flash does not tell it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Programs {
     /// The lowest security counter that an image may have.
     pub counter: u32,
@@ -22,6 +22,14 @@ pub struct Programs {
     pub erases: u16,
     /// Number of clears that the bootloader accepts now.
     pub clears_allowed: u8,
+}
+
+/// No programs, and the budget of clears after power-on.
+impl Default for Programs {
+    fn default() -> Programs {
+        let clears_allowed = Clears::default().left();
+        Programs { counter: 0, generation: 0, staged: 0, kept: 0, erases: 0, clears_allowed }
+    }
 }
 
 impl Programs {

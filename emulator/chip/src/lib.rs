@@ -42,6 +42,7 @@ mod peripherals;
 mod pins;
 pub mod plant;
 mod pwr;
+pub mod random;
 mod rcc;
 mod register;
 mod rules;

@@ -138,9 +138,9 @@ pub enum Breach {
     /// HSE is set to something else than what the board has at `OSC_IN`.
     #[error("HSE is switched on for {set}, but the board has {present}")]
     Oscillator {
-        /// What the program has set.
+        /// The setting of the program.
         set: &'static str,
-        /// What the board has.
+        /// The property of the board.
         present: &'static str,
     },
     /// The flash is changed by double words, for which VPP needs 8 to 9 V (RM0390 table 7, PSIZE).

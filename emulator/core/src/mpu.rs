@@ -86,7 +86,7 @@ impl Mpu {
         Some(())
     }
 
-    /// What is not modelled of the region that was written last.
+    /// The property of the region written last that is not modelled.
     pub(crate) fn not_modelled(&self) -> Option<&'static str> {
         let region = self.regions[self.number as usize];
         let exponent = (region.attributes >> 1 & 0x1F) + 1;

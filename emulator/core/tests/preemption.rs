@@ -114,7 +114,7 @@ fn the_same_seed_gives_the_same_run() {
     assert_ne!(trace(1), trace(2));
 }
 
-/// What `posted_stores` notes, without and with a barrier or a read in between: entries of a handler that lowers its line
+/// The notes of `posted_stores`, without and with a barrier or a read in between: entries of a handler that lowers its line
 /// last; whether an interrupt is pending again after its line was lowered; what a register takes behind its clock.
 fn posted(bench: &mut Bench) -> [u32; 6] {
     assert_eq!(bench.run_long(), Verdict::Passed);

@@ -3,9 +3,11 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
+use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -66,6 +68,9 @@ impl App {
         let socketcand = gateway.listen(options.socketcand, Protocol::Socketcand)?;
         let slcan = options.slcan.map(|address| gateway.listen(address, Protocol::Slcan)).transpose()?;
         let mut world = setup::world(&options)?;
+        if options.threads.is_none() {
+            world.set_threads(thread::available_parallelism().unwrap_or(NonZeroUsize::MIN));
+        }
         if let Some(interface) = &options.socketcan {
             gateway.attach_interface(interface, &mut world)?;
         }

@@ -1,6 +1,7 @@
 //! Wrong reads of a flash that is too slow: below 2.7 V a read takes more wait states than a program has set that was made
 //! for 3.3 V (RM0390, table 5). The core then executes code near the program counter that has a wrong bit.
 
+use chip::random::mix;
 use chip::{FLASH_BASE, Stm32f4};
 use emulator::Machine;
 
@@ -51,11 +52,4 @@ impl BadReads {
             let _ = machine.write(place, &[right]);
         }
     }
-}
-
-/// The output function of SplitMix64.
-fn mix(count: u64) -> u64 {
-    let z = count.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z ^ z >> 27
 }

@@ -33,7 +33,7 @@ struct Helper {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What a helper and the owner of the boards share. The state says who may touch the rest: the helper while it is
+/// The memory that a helper and the owner of the boards share. The state says who may touch the rest: the helper while it is
 /// [`WORKING`], the owner otherwise. Its alignment keeps the lines of two helpers in different lines of the caches.
 #[repr(align(128))]
 struct Line {

@@ -1,5 +1,6 @@
 //! The counters of a board's machine as figures for the summary.
 
+use bsp::vectors::UNUSED_STACK;
 use canbus::Time;
 use chip::Stm32f4;
 use emulator::{Exception, Incident, Machine};
@@ -60,9 +61,6 @@ pub(crate) fn memory(
     Memory { flash: firmware.flash_size, bootloader_flash, ram: firmware.ram_size, stack }
 }
 
-/// The content of the unused stack of a development image, which it fills at its start (crates/bsp, `start_tests`).
-const UNUSED: u32 = 0xA5C3_965A;
-
 fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
     let bottom = machine.model().ram.start;
     let mut stack = vec![0; start.saturating_sub(bottom) as usize];
@@ -70,7 +68,7 @@ fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
         return 0;
     }
     let before = machine.ram_at_power_on();
-    let marked = UNUSED.to_le_bytes().into_iter().cycle();
+    let marked = UNUSED_STACK.to_le_bytes().into_iter().cycle();
     let is_unused = |((now, before), marked): &((&u8, &u8), u8)| now == before || *now == marked;
     let untouched = stack
         .iter()

@@ -86,7 +86,7 @@ pub enum Unit {
     Delivered,
     /// The code that was read or written.
     Code(u32),
-    /// It was changed, and the node has booted since: the node may have saved it or not.
+    /// The unit was changed before the last boot-up, and may be saved or not.
     Unknown,
 }
 

@@ -5,7 +5,6 @@
 //! between two events of the bus the boards depend on nothing but themselves, and run on several threads.
 
 use std::num::NonZeroUsize;
-use std::thread;
 use std::time::Instant;
 
 use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
@@ -123,7 +122,7 @@ impl World {
             bit_rate,
             bit,
             bus,
-            crew: Crew::new(threads(thread::available_parallelism().map_or(1, NonZeroUsize::get), &boards)),
+            crew: Crew::default(),
             boards,
             host,
             load,
@@ -281,9 +280,10 @@ impl World {
         earliest.map_or(Time::NEVER, |earliest| earliest.max(self.now) + self.bit * QUANTUM_BITS)
     }
 
-    /// Runs the boards on at most this many threads. The run is the same with any number.
+    /// Runs the boards on at most this many threads, instead of on one. The run is the same with any number.
     pub fn set_threads(&mut self, count: NonZeroUsize) {
-        self.crew = Crew::new(threads(count.get(), &self.boards));
+        // A thread needs a board to run.
+        self.crew = Crew::new(count.get().min(self.boards.len()));
     }
 
     /// Sets whether a broken rule of the chip panics, or is only reported in the summary. A test that breaks a rule on
@@ -409,11 +409,6 @@ impl World {
             host_time: self.host_time,
         }
     }
-}
-
-/// The number of threads that have a board to run.
-fn threads(most: usize, boards: &[Board]) -> usize {
-    most.min(boards.len()).max(1)
 }
 
 impl Observed {

@@ -39,8 +39,7 @@ fn is_comparable(row: &Object) -> bool {
     // Excluded: names and versions of the image, its identification, the room in its memory, the
     // measured value that is taken as zero, and 2F00h, which a reset of the chip empties.
     let is_own =
-        matches!((row.index, row.sub), (0x1008..=0x100A | 0x1F56 | 0x2010 | 0x2F00, _) | (0x2004, 7))
-            || row.access == Access::WriteOnly;
+        matches!(row.index, 0x1008..=0x100A | 0x1F56 | 0x2010 | 0x2F00) || row.access == Access::WriteOnly;
     let is_stored = matches!(
         row.rule(),
         Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::Setting | Rule::ProgramControl

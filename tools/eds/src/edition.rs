@@ -2,7 +2,9 @@
 //!
 //! The file in the tree is the record: a sheet that differs in its edition only keeps the edition of the file.
 
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
+
+use chrono::{DateTime, Utc};
 
 use crate::Device;
 
@@ -37,26 +39,17 @@ impl Edition {
 
 /// The present day (UTC) as CiA 306 writes it.
 fn today() -> String {
-    const DAY: u64 = 86_400;
-    let days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs() / DAY);
-    date(days)
+    date(SystemTime::now().into())
 }
 
-/// The day that is this number of days after 1970-01-01, in the Gregorian calendar.
-fn date(days: u64) -> String {
-    // Years begin in March, so that the leap day is the last day of a year. An era has 400 years.
-    const ERA: u64 = 146_097;
-    let (era, day) = ((days + 719_468) / ERA, (days + 719_468) % ERA);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (day, year) = (day - (153 * month + 2) / 5 + 1, year + 400 * era);
-    let (month, year) = if month < 10 { (month + 3, year) } else { (month - 9, year + 1) };
-    format!("{month:02}-{day:02}-{year}")
+fn date(day: DateTime<Utc>) -> String {
+    day.format("%m-%d-%Y").to_string()
 }
 
 #[cfg(test)]
 mod tests {
+    use chrono::Days;
+
     use super::*;
     use crate::DEVICES;
 
@@ -65,7 +58,7 @@ mod tests {
         for (days, text) in
             [(0, "01-01-1970"), (11_016, "02-29-2000"), (20_512, "02-28-2026"), (20_782, "11-25-2026")]
         {
-            assert_eq!(date(days), text);
+            assert_eq!(date(DateTime::UNIX_EPOCH + Days::new(days)), text);
         }
     }
 

@@ -147,6 +147,15 @@ fn decode_utf16(bytes: &[u8]) -> String {
     String::from_utf16_lossy(&units).trim_end_matches('\0').to_owned()
 }
 
+/// A number of at most 32 bits, decimal, or hexadecimal after 0x.
+#[must_use]
+pub fn unsigned(text: &str) -> Option<u32> {
+    match integer(text, 0, u32::MAX.into())? {
+        Value::Integer(value) => u32::try_from(value).ok(),
+        _ => None,
+    }
+}
+
 fn boolean(text: &str) -> Option<Value> {
     match text.trim() {
         "true" | "1" => Some(Value::Integer(1)),

@@ -15,9 +15,8 @@ use super::transmit::Transmitter;
 use super::{memory, receive};
 use crate::bit_timing::{APB1_HZ, BitTiming};
 use crate::filters::{self, Fifo};
+use crate::vectors::UNUSED_STACK;
 
-/// The content of a word of the stack that was never used.
-const UNUSED: u32 = 0xA5C3_965A;
 /// DEMCR: the trace unit is on. DWT_CTRL: the cycle counter runs (ARMv7-M, C1.6.5 and C1.8.7).
 const TRACE: u32 = 1 << 24;
 const COUNTS_CYCLES: u32 = 1 << 0;
@@ -66,7 +65,7 @@ fn mark_stack(end: u32) {
             "3:",
             at = inout(reg) end => _,
             top = out(reg) _,
-            mark = in(reg) UNUSED,
+            mark = in(reg) UNUSED_STACK,
         );
     }
 }
@@ -75,7 +74,7 @@ fn mark_stack(end: u32) {
 pub(super) fn note_stack() {
     let stack = memory::stack();
     // SAFETY: RAM, of which any content is a valid word.
-    let is_unused = |at: &u32| unsafe { (*at as *const u32).read_volatile() } == UNUSED;
+    let is_unused = |at: &u32| unsafe { (*at as *const u32).read_volatile() } == UNUSED_STACK;
     let unused = stack.step_by(4).take_while(is_unused).count() as u32;
     FOUND.free_stack.store(4 * unused, Ordering::Relaxed);
 }

@@ -152,7 +152,7 @@ impl<D: Definition> Device<D> {
         self.services_next()
     }
 
-    /// As [`next`](Device::next), for a caller that ignores a part of the result.
+    /// The same as [`next`](Device::next), for a caller that ignores a part of the result: it is inlined there.
     #[inline]
     pub(super) fn services_next(&mut self) -> Next {
         let inner = &mut self.inner;

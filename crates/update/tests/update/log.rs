@@ -32,15 +32,15 @@ fn each_update_leaves_its_events_with_version_and_reason() {
     update(&mut flash, &image_b().bytes()).unwrap();
     start(&mut flash);
     look(&mut flash, &mut log);
-    Cause::Command.note(&mut flash, &layout);
     confirm(&mut flash);
+    Cause::Command.note(&mut flash, &layout);
     look(&mut flash, &mut log);
     // Not confirmed in time.
     update(&mut flash, &image_a().bytes()).unwrap();
     start(&mut flash);
     look(&mut flash, &mut log);
-    Cause::Time.note(&mut flash, &layout);
     Trial::withdraw(&mut flash, &layout).unwrap();
+    Cause::Time.note(&mut flash, &layout);
     start(&mut flash);
     look(&mut flash, &mut log);
     // Three starts, of which the program has seen none for long enough to log it.
@@ -95,8 +95,8 @@ fn a_power_cut_costs_at_most_the_reason() {
         look(&mut flash, &mut log);
         if Trial::read(&mut flash, &layout) == Trial::Open {
             flash.cut_after(cut % 4, weak);
-            Cause::Command.note(&mut flash, &layout);
             let _ = Trial::confirm(&mut flash, &layout);
+            Cause::Command.note(&mut flash, &layout);
             flash.power_up();
             let _ = Trial::confirm(&mut flash, &layout);
             start(&mut flash);

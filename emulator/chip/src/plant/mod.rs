@@ -239,7 +239,7 @@ impl Plant {
         started != ended && !self.has(FaultKind::MissingIndex, now)
     }
 
-    /// What the absolute encoder sends; `None` when its data line is broken.
+    /// The reading of the absolute encoder; `None` when its data line is broken.
     pub(crate) fn absolute(&self, now: Time) -> Option<Reading> {
         let half_off = if self.has(FaultKind::WrongCode, now) { 0.5 } else { 0.0 };
         (!self.has(FaultKind::OpenSsi, now)).then(|| Reading {

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use canbus::Time;
 
 use super::table::Table;
+use crate::random::mix;
 
 /// A quantity as a function of the time since its signal was set, in seconds.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,14 +90,6 @@ fn normal(seed: u64, age: Time) -> f64 {
 /// From 2^-53 to 1, zero excluded.
 fn unit(bits: u64) -> f64 {
     ((bits >> 11) + 1) as f64 / (1_u64 << 53) as f64
-}
-
-/// The output function of SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
-fn mix(seed: u64) -> u64 {
-    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ z >> 31
 }
 
 /// A signal and when it was set.

@@ -139,7 +139,7 @@ fn program_with(rig: &mut Rig, wrong: bool) {
 /// The ADC at 18 MHz, its channel with this many cycles by their code.
 fn adc(rig: &mut Rig, channel: u32, code: u32) {
     rig.firmware_clocks();
-    // What that does in a hurry.
+    // The set-up of the clocks is too quick for the rules: its breaches are discarded.
     while rig.chip.breach().is_some() {}
     rig.set(AHB1ENR, 0b101);
     rig.set(APB2ENR, 1 << 8);
@@ -192,7 +192,7 @@ fn stream(rig: &mut Rig, memory: u32, peripheral: u32) {
     rig.write(STREAM, 1 << 11 | 1 << 13 | 1);
 }
 
-/// What the rules say of a program.
+/// The rules that a program breaks.
 fn told(program: fn(&mut Rig, bool), wrong: bool) -> String {
     let mut rig = Rig::new();
     program(&mut rig, wrong);

@@ -1,4 +1,4 @@
-//! What a program sees of stores that are still on their way. It notes what it saw; the test knows what is right in which
+//! A program observes its stores that have not arrived yet, and notes the observations; the test knows the right ones in each
 //! mode. On the bench, the word at 4000 0000h is the level of interrupt 28, and bit 0 of the word at 4002 3830h is the clock
 //! of the word at 4002 0000h.
 #![no_std]

@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::fs;
 use std::path::PathBuf;
 
 use canopen::{Duration, Frame, NodeId, QueueFull, Transmit};
@@ -15,7 +14,10 @@ use crate::bus::Station;
 use crate::object::at;
 use crate::simulate::{Node, Script, Table};
 use crate::text::{note, visible};
+use crate::value::unsigned;
 
+/// The largest script.
+const LARGEST: u64 = 1 << 20;
 /// The longest wait for a frame, so that the end of the command is noticed.
 const WAKE: Duration = Duration::from_millis(100);
 
@@ -27,7 +29,7 @@ pub(super) struct Simulate {
     values: Option<PathBuf>,
 
     /// The serial number (1018h:4).
-    #[arg(long, value_parser = clap_num)]
+    #[arg(long, value_parser = number)]
     serial: Option<u32>,
 
     /// Start without a node-ID and wait for LSS.
@@ -39,8 +41,8 @@ pub(super) struct Simulate {
     duration: Option<u32>,
 }
 
-fn clap_num(text: &str) -> Result<u32, std::num::ParseIntError> {
-    text.strip_prefix("0x").map_or_else(|| text.parse(), |digits| u32::from_str_radix(digits, 16))
+fn number(text: &str) -> Result<u32, String> {
+    unsigned(text).ok_or_else(|| format!("\"{text}\" is no number of 32 bits"))
 }
 
 #[derive(Serialize)]
@@ -88,7 +90,7 @@ impl Simulate {
 
     fn script(&self, catalogue: Catalogue) -> Result<Script, Failure> {
         let Some(path) = &self.values else { return Ok(Script::default()) };
-        let text = fs::read_to_string(path).map_err(|error| Failure::file(path, error))?;
+        let text = wire::input::read_to_string(path, LARGEST).map_err(|error| Failure::file(path, error))?;
         Script::parse(&text, &catalogue).map_err(|error| Failure::file(path, error))
     }
 

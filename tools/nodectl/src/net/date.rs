@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use chrono::{Datelike as _, Days, NaiveDate, NaiveTime, Timelike as _};
 use schemars::JsonSchema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
@@ -17,8 +18,8 @@ pub struct Date {
     pub milliseconds: u32,
 }
 
-/// Days from 0000-03-01 to 1984-01-01.
-const EPOCH: i64 = 724_581;
+/// The day with the number 0.
+const EPOCH: NaiveDate = NaiveDate::from_ymd_opt(1984, 1, 1).expect("a date");
 const MINUTE: u32 = 60_000;
 
 impl FromStr for Date {
@@ -27,53 +28,32 @@ impl FromStr for Date {
     /// `2026-11-24`, or `2026-11-24 10:30`.
     fn from_str(text: &str) -> Result<Date, String> {
         let (day, time) = text.split_once([' ', 'T']).unwrap_or((text, "00:00"));
-        let date = days(day).zip(minutes(time));
-        let found = date.map(|(days, minutes)| Date { days, milliseconds: minutes * MINUTE });
-        found.ok_or_else(|| format!("\"{text}\" is no date such as 2026-11-24 10:30, from 1984-01-01 on"))
+        let found = days(day).zip(minutes(time));
+        found
+            .map(|(days, minutes)| Date { days, milliseconds: minutes * MINUTE })
+            .ok_or_else(|| format!("\"{text}\" is no date such as 2026-11-24 10:30, from 1984-01-01 on"))
     }
 }
 
 fn days(text: &str) -> Option<u32> {
-    let mut parts = text.splitn(3, '-').map(|part| part.parse::<i64>().ok());
-    let (year, month, day) = (parts.next()??, parts.next()??, parts.next()??);
-    let is_date = (1984..10_000).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&day);
-    let since = day_number(year, month, day);
-    let found = is_date.then(|| u32::try_from(since - EPOCH).ok())??;
-    // 31 April is 1 May.
-    (civil(found) == (year, month, day)).then_some(found)
-}
-
-/// Days since 0000-03-01, in years that begin in March.
-fn day_number(year: i64, month: i64, day: i64) -> i64 {
-    let (year, month) = if month < 3 { (year - 1, month + 9) } else { (year, month - 3) };
-    365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day - 1
-}
-
-/// Year, month and day.
-fn civil(days: u32) -> (i64, i64, i64) {
-    let since = i64::from(days) + EPOCH;
-    let era = since / 146_097;
-    let of_era = since % 146_097;
-    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year + year / 4 - year / 100);
-    let month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * month + 2) / 5 + 1;
-    let year = era * 400 + year;
-    if month < 10 { (year, month + 3, day) } else { (year + 1, month - 9, day) }
+    let day = NaiveDate::parse_from_str(text, "%Y-%m-%d").ok().filter(|day| day.year() < 10_000)?;
+    u32::try_from(day.signed_duration_since(EPOCH).num_days()).ok()
 }
 
 fn minutes(text: &str) -> Option<u32> {
-    let (hour, minute) = text.split_once(':')?;
-    let (hour, minute): (u32, u32) = (hour.parse().ok()?, minute.parse().ok()?);
-    (hour < 24 && minute < 60).then_some(hour * 60 + minute)
+    let time = NaiveTime::parse_from_str(text, "%H:%M").ok()?;
+    Some(time.hour() * 60 + time.minute())
 }
 
 /// `2026-11-24 10:30`
 impl fmt::Display for Date {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let (year, month, day) = civil(self.days);
         let minutes = self.milliseconds / MINUTE;
-        write!(f, "{year:04}-{month:02}-{day:02} {:02}:{:02}", minutes / 60, minutes % 60)
+        match EPOCH.checked_add_days(Days::new(self.days.into())) {
+            Some(day) => write!(f, "{} {:02}:{:02}", day.format("%Y-%m-%d"), minutes / 60, minutes % 60),
+            // A device can have any number.
+            None => write!(f, "{} days after 1984-01-01", self.days),
+        }
     }
 }
 

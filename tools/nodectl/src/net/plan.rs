@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use canopen::NodeId;
+use canopen::{Duration, NodeId};
 use eds::Eds;
 use thiserror::Error;
 
@@ -112,9 +112,14 @@ impl PlannedNode {
         }
     }
 
+    /// The time of the heartbeat; `None` where the file has none, or switches it off.
+    #[must_use]
+    pub fn heartbeat(&self) -> Option<Duration> {
+        self.member.heartbeat.filter(|time| *time > 0).map(|time| Duration::from_millis(time.into()))
+    }
+
     /// The parameters that the file sets, with this data sheet: the values of the configuration file, heartbeats,
-    /// guarding, and single values. The date of the configuration is not
-    /// among them where the file has one.
+    /// guarding, and single values. The date of the configuration is not among them where the file has one.
     ///
     /// # Errors
     /// An object is not in the data sheet, or a value is none of the object.

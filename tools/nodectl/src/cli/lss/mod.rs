@@ -16,6 +16,7 @@ use super::{Failure, Session};
 use crate::heartbeat;
 use crate::lss::{Master, Selection};
 use crate::text::note;
+use crate::value::unsigned;
 
 /// The minimum time to wait for a node that boots with a new node-ID.
 const BOOT: Duration = Duration::from_millis(2000);
@@ -244,11 +245,7 @@ pub(super) fn bit_rate(kbit: u16) -> Result<BitRate, Failure> {
 }
 
 fn identity(text: &str) -> Result<Identity, String> {
-    let number = |text: &str| match text.strip_prefix("0x") {
-        Some(digits) => u32::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
-    };
-    let numbers: Option<Vec<u32>> = text.split(':').map(number).collect();
+    let numbers: Option<Vec<u32>> = text.split(':').map(unsigned).collect();
     match numbers.as_deref() {
         Some(&[vendor, product, revision, serial]) => Ok(Identity { vendor, product, revision, serial }),
         _ => Err("an identity is VENDOR:PRODUCT:REVISION:SERIAL".to_owned()),

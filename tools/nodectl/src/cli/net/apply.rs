@@ -91,14 +91,8 @@ pub(super) fn configure(
             Ok(Vec::new())
         }
         Ok(Err(findings)) => Ok(findings),
-        Err(Failure::Sdo(error)) if error.is_silence() => {
-            Ok(vec![Finding::new(planned.node, What::Missing, error.to_string())])
-        }
-        Err(Failure::Sdo(error)) if error.abort().is_some() => {
-            Ok(vec![Finding::new(planned.node, What::Refused, error.to_string())])
-        }
         Err(Failure::NotApplied(text)) => Ok(vec![Finding::new(planned.node, What::Refused, text)]),
-        Err(other) => Err(other),
+        Err(failure) => Ok(vec![Finding::of_failure(planned.node, failure)?]),
     }
 }
 

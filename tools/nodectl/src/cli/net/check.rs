@@ -9,7 +9,7 @@ use canopen::{Duration, NodeId};
 use serde::Serialize;
 
 use super::finding::{Finding, What, end, print};
-use super::{Failure, LISTEN, Session, catalogue};
+use super::{Failure, LISTEN, Session, catalogue, patience};
 use crate::Catalogue;
 use crate::configuration::Configuration;
 use crate::heartbeat;
@@ -18,9 +18,6 @@ use crate::object::{Place, at};
 use crate::scan::{Presence, scan};
 use crate::text::visible;
 use crate::value::Value;
-
-/// How much later than its time a heartbeat may come.
-const LATE: (u64, u64) = (3, 2);
 
 /// The nodes that a scan has found.
 pub(super) type Found = BTreeMap<NodeId, Presence>;
@@ -89,12 +86,8 @@ pub(super) fn of_bus(plan: &Plan, found: &Found) -> Vec<Finding> {
 fn of_node(session: &mut Session, planned: &PlannedNode) -> Result<Vec<Finding>, Failure> {
     session.begin_all();
     let mut findings = Vec::new();
-    match compare(session, planned, &mut findings) {
-        Err(Failure::Sdo(error)) if error.is_silence() || error.abort().is_some() => {
-            let what = if error.is_silence() { What::Missing } else { What::Refused };
-            findings.push(Finding::new(planned.node, what, error.to_string()));
-        }
-        other => other?,
+    if let Err(failure) = compare(session, planned, &mut findings) {
+        findings.push(Finding::of_failure(planned.node, failure)?);
     }
     Ok(findings)
 }
@@ -204,14 +197,13 @@ pub(super) fn of_states(
     plan: &Plan,
     present: &[&PlannedNode],
 ) -> Result<Vec<Finding>, Failure> {
-    let time = |planned: &PlannedNode| planned.member.heartbeat.filter(|time| *time > 0).map(u64::from);
-    let Some(longest) = present.iter().filter_map(|planned| time(planned)).max() else {
+    let Some(longest) = present.iter().filter_map(|planned| planned.heartbeat()).max() else {
         return Ok(Vec::new());
     };
-    let wait = Duration::from_millis(longest * LATE.0 / LATE.1);
+    let wait = patience(longest);
     let heard = listen(session, wait, present)?;
     let mut findings = Vec::new();
-    for planned in present.iter().filter(|planned| time(planned).is_some()) {
+    for planned in present.iter().filter(|planned| planned.heartbeat().is_some()) {
         let is_started = planned.member.start && plan.start != Start::None;
         match heard.get(&planned.node) {
             None => {
@@ -241,8 +233,7 @@ fn listen(
         let heartbeat = heartbeat::Heartbeat::parse(frame)?;
         heard.insert(heartbeat.node, heartbeat.state);
         let is_up = |planned: &&PlannedNode| {
-            let needs = planned.member.heartbeat.is_some_and(|time| time > 0);
-            !needs || heard.get(&planned.node) == Some(&State::Operational)
+            planned.heartbeat().is_none() || heard.get(&planned.node) == Some(&State::Operational)
         };
         nodes.iter().all(is_up).then_some(())
     })?;

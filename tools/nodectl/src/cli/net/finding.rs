@@ -60,6 +60,19 @@ impl Finding {
     pub(super) fn new(node: canopen::NodeId, what: What, text: String) -> Finding {
         Finding { node: Some(node.get()), what, text }
     }
+
+    /// A finding about a node that is silent or refuses something.
+    ///
+    /// # Errors
+    /// Any other failure: it ends the command.
+    pub(super) fn of_failure(node: canopen::NodeId, failure: Failure) -> Result<Finding, Failure> {
+        let what = match &failure {
+            Failure::Sdo(error) if error.is_silence() => What::Missing,
+            Failure::Sdo(error) if error.abort().is_some() => What::Refused,
+            _ => return Err(failure),
+        };
+        Ok(Finding::new(node, what, failure.to_string()))
+    }
 }
 
 /// `node 5: product: 00000001h instead of 00000007h`

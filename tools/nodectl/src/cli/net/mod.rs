@@ -94,8 +94,7 @@ impl From<PlanError> for Failure {
 
 /// The plan of a file, with the files that it names.
 fn load(path: &Path) -> Result<Plan, Failure> {
-    let bytes = wire::input::read(path, LARGEST).map_err(|error| Failure::file(path, error))?;
-    let text = String::from_utf8(bytes).map_err(|error| Failure::file(path, error))?;
+    let text = wire::input::read_to_string(path, LARGEST).map_err(|error| Failure::file(path, error))?;
     let file = File::parse(&text).map_err(|reason| Failure::file(path, reason))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let plan = Plan::new(file, |named| super::session::sheet(&folder.join(named)));
@@ -111,4 +110,9 @@ fn catalogue(session: &mut Session, planned: &PlannedNode) -> Result<Arc<Catalog
         session.know(planned.node, Arc::clone(catalogue));
     }
     session.catalogue(planned.node)
+}
+
+/// How long to wait for a heartbeat of this time.
+fn patience(heartbeat: Duration) -> Duration {
+    Duration(heartbeat.0 * 3 / 2)
 }

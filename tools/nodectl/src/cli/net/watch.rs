@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::apply::configure;
 use super::finding::print;
-use super::{Applied, Failure, Session};
+use super::{Applied, Failure, Session, patience};
 use crate::net::{Plan, PlannedNode, Start};
 use crate::nmt::send;
 
@@ -82,11 +82,8 @@ fn miss(
     watched: Option<&mut Watched>,
     now: Instant,
 ) -> Result<(), Failure> {
-    let (Some(watched), Some(time)) = (watched, planned.member.heartbeat.filter(|time| *time > 0)) else {
-        return Ok(());
-    };
-    let limit = Duration::from_millis(u64::from(time) * 3 / 2);
-    let is_late = watched.newest.is_some_and(|newest| newest + limit < now);
+    let (Some(watched), Some(time)) = (watched, planned.heartbeat()) else { return Ok(()) };
+    let is_late = watched.newest.is_some_and(|newest| newest + patience(time) < now);
     if is_late && !watched.is_lost {
         watched.is_lost = true;
         tell(session, planned, "lost: no heartbeat")?;
