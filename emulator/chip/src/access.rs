@@ -7,7 +7,7 @@ use crate::loss::Loss;
 use crate::map::{self, Block, Unit};
 use crate::peripherals::BusFault;
 use crate::rcc::Rcc;
-use crate::rules::Breach;
+use crate::breach::Breach;
 use crate::signature;
 use crate::stm32f4::Stm32f4;
 use crate::unmodelled::{Direction, Reason};

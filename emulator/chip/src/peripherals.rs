@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use canbus::Time;
 
-use crate::rules::Breach;
+use crate::breach::Breach;
 
 /// Levels of the chip's interrupt lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

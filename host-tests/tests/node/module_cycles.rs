@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const CRATES: [&str; 16] = [
+const CRATES: [&str; 17] = [
     "bootloader",
     "crates/bsp",
     "crates/node",
@@ -15,6 +15,7 @@ const CRATES: [&str; 16] = [
     "crates/storage",
     "crates/update",
     "emulator/canbus",
+    "emulator/chip",
     "emulator/core",
     "emulator/sim",
     "emulator/workbench",
