@@ -3,6 +3,7 @@
 use std::fmt;
 use std::fs;
 use std::net::{SocketAddr, TcpStream};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
@@ -11,7 +12,9 @@ use serde::Serialize;
 use super::{Failure, Session};
 use crate::text::visible;
 
-/// The number of a CAN interface in /sys/class/net/*/type (`ARPHRD_CAN`).
+/// The folder with the interfaces of Linux; each has a file `type`.
+const INTERFACES: &str = "/sys/class/net";
+/// The type of a CAN interface (`ARPHRD_CAN`).
 const CAN: &str = "280";
 /// Where `cargo sim` and socketcand listen.
 const SOCKETCAND: ([u8; 4], u16) = ([127, 0, 0, 1], 29_536);
@@ -40,7 +43,8 @@ struct Found {
 impl Bus {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let Command::List = self.command;
-        let found: Vec<Found> = interfaces().into_iter().chain(daemon()).chain(serial_ports()).collect();
+        let found: Vec<Found> =
+            interfaces(Path::new(INTERFACES)).into_iter().chain(daemon()).chain(serial_ports()).collect();
         if found.is_empty() {
             crate::text::note("no CAN interface, no serial port and no socketcand daemon on this host");
         }
@@ -48,10 +52,10 @@ impl Bus {
     }
 }
 
-/// The CAN interfaces of Linux, with their state.
-fn interfaces() -> Vec<Found> {
-    let folder = fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
-    let read = |path: std::path::PathBuf| fs::read_to_string(path).unwrap_or_default().trim().to_owned();
+/// The CAN interfaces in a folder of interfaces, with their state.
+fn interfaces(folder: &Path) -> Vec<Found> {
+    let folder = fs::read_dir(folder).into_iter().flatten().flatten();
+    let read = |path: PathBuf| fs::read_to_string(path).unwrap_or_default().trim().to_owned();
     let mut found: Vec<Found> = folder
         .filter(|entry| read(entry.path().join("type")) == CAN)
         .map(|entry| Found {
@@ -90,5 +94,32 @@ fn serial_ports() -> Vec<Found> {
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{:<28} {}", visible(&self.bus), visible(&self.what))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_can_interfaces_are_addresses() {
+        let folder = std::env::temp_dir().join(format!("nodectl-interfaces-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        for (name, kind, state) in [("can1", "280", "up"), ("eth0", "1", "up"), ("can0", "280", "down")] {
+            let interface = folder.join(name);
+            fs::create_dir_all(&interface).unwrap();
+            fs::write(interface.join("type"), format!("{kind}\n")).unwrap();
+            fs::write(interface.join("operstate"), format!("{state}\n")).unwrap();
+        }
+        let lines: Vec<String> = interfaces(&folder).iter().map(ToString::to_string).collect();
+        assert_eq!(
+            lines,
+            [
+                "socketcan:can0               CAN interface, down",
+                "socketcan:can1               CAN interface, up"
+            ]
+        );
+        fs::remove_dir_all(&folder).unwrap();
+        assert!(interfaces(&folder).is_empty());
     }
 }

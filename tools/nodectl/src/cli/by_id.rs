@@ -6,16 +6,12 @@ use std::fmt;
 use canopen::Instant;
 use serde::Serialize;
 
+use super::load;
 use crate::text::hex_digits;
 use crate::trace::{Kind, Line};
 
 /// The time over which the peak of the load is measured, in microseconds.
 const WINDOW: u64 = 100_000;
-/// The bits of a base frame without data: 44, the interframe space of 3, and an eighth of stuff bits.
-const FRAME_BITS: u64 = 53;
-/// The bits of a byte with its share of stuff bits.
-const BYTE_BITS: u64 = 9;
-
 /// The frames of all CAN-IDs.
 #[derive(Default)]
 pub(super) struct ByCanId {
@@ -73,7 +69,7 @@ impl ByCanId {
     pub(super) fn add(&mut self, id: u32, kind: Kind, node: Option<u8>, data: &[u8], at: Instant) {
         let first = *self.first.get_or_insert(at);
         self.last = self.last.max(at);
-        let bits = FRAME_BITS + BYTE_BITS * data.len() as u64;
+        let bits = load::bits(data.len());
         let window = at.0.saturating_sub(first.0) / WINDOW;
         self.window = if window == self.window.0 { (window, self.window.1 + bits) } else { (window, bits) };
         (self.bits, self.peak) = (self.bits + bits, self.peak.max(self.window.1));
@@ -100,7 +96,7 @@ impl ByCanId {
     pub(super) fn rows(&self) -> impl Iterator<Item = Row> {
         self.rows.iter().map(|(id, row)| {
             let has_gaps = row.count > 1;
-            let whole = row.last.0 - row.first.0;
+            let whole = row.last.0.saturating_sub(row.first.0);
             Row {
                 can_id: *id,
                 kind: row.kind,
@@ -191,8 +187,20 @@ mod tests {
         assert_eq!((rows[0].shortest, rows[0].longest), (Some(9.0), Some(11.0)));
         assert_eq!((rows[1].count, rows[1].period), (1, None));
         let bus = all.bus(250);
-        // 4 frames of 125 bits and one of 62 in 25,000 bits.
-        assert_eq!((bus.frames, format!("{:.2}", bus.load_percent)), (5, "2.25".to_owned()));
-        assert_eq!(format!("{:.2}", bus.peak_percent), "2.00");
+        // 4 frames of 117 bits and one of 57 in 25,000 bits.
+        assert_eq!((bus.frames, format!("{:.2}", bus.load_percent)), (5, "2.10".to_owned()));
+        assert_eq!(format!("{:.2}", bus.peak_percent), "1.87");
+    }
+
+    /// As in a log that was put together from two.
+    #[test]
+    fn a_frame_may_be_older_than_the_one_before() {
+        let mut all = ByCanId::default();
+        for at in [50_000, 10_000] {
+            all.add(0x181, Kind::Pdo, Some(1), &[1], Instant(at));
+        }
+        let rows: Vec<Row> = all.rows().collect();
+        assert_eq!((rows[0].count, rows[0].period), (2, Some(0.0)));
+        assert_eq!(all.bus(250).frames, 2);
     }
 }

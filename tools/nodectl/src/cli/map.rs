@@ -8,6 +8,7 @@ use canopen::sdo::Multiplexer;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
+use super::can_id::can_id;
 use super::{Failure, Session};
 use crate::Catalogue;
 use crate::object::{Place, at};
@@ -34,7 +35,7 @@ pub(super) struct Map {
     #[arg(long = "transmission", value_name = "TYPE")]
     transmission: Option<u8>,
 
-    /// The CAN-ID, in hexadecimal digits after 0x; unchanged if it is left out.
+    /// The CAN-ID in hexadecimal digits (181, 0x181, 181h); unchanged if it is left out.
     #[arg(long, value_name = "CAN-ID", value_parser = can_id)]
     cob_id: Option<u16>,
 
@@ -49,15 +50,6 @@ pub(super) struct Map {
     /// The SYNC start value.
     #[arg(long, value_name = "COUNTER")]
     sync_start: Option<u8>,
-}
-
-fn can_id(text: &str) -> Result<u16, String> {
-    let number =
-        text.strip_prefix("0x").map_or_else(|| text.parse(), |digits| u16::from_str_radix(digits, 16));
-    number
-        .ok()
-        .filter(|id| (1..0x800).contains(id))
-        .ok_or_else(|| format!("\"{text}\" is no CAN-ID, as 0x181"))
 }
 
 /// Switches a PDO off and empties its mapping.

@@ -2,6 +2,7 @@
 
 mod bus;
 mod by_id;
+mod can_id;
 mod check;
 mod dbc;
 mod dump;
@@ -9,6 +10,7 @@ mod explain;
 mod failure;
 mod info;
 mod list;
+mod load;
 mod lss;
 mod manual;
 mod map;

@@ -7,6 +7,7 @@ use canopen::{Duration, Instant, NodeId};
 use clap::Args;
 use serde::Serialize;
 
+use super::can_id::can_id;
 use super::node_set::NodeSet;
 use super::traffic::Records;
 use super::{Failure, Session};
@@ -23,18 +24,13 @@ pub(super) struct Replay {
     #[arg(long, value_name = "NODES", default_value = "all")]
     of: NodeSet,
 
-    /// Only these CAN-IDs, in hexadecimal digits.
+    /// Only these CAN-IDs, in hexadecimal digits (181, 0x181, 181h).
     #[arg(long, value_name = "ID", value_delimiter = ',', value_parser = can_id)]
     id: Vec<u16>,
 
     /// How many times faster than the log; 0 without pauses.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     speed: f64,
-}
-
-fn can_id(text: &str) -> Result<u16, String> {
-    let id = u16::from_str_radix(text.trim_end_matches(['h', 'H']).trim_start_matches("0x"), 16);
-    id.ok().filter(|id| *id < 0x800).ok_or_else(|| format!("\"{text}\" is no CAN-ID, as 181"))
 }
 
 #[derive(Serialize)]

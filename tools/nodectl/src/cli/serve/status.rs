@@ -2,6 +2,8 @@
 
 use canopen::Frame;
 
+use crate::cli::load;
+
 /// Frames and bits since the last rate, and frames in total.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Count {
@@ -19,17 +21,10 @@ pub(super) struct Rate {
     bits: f64,
 }
 
-/// Bits of a frame with an 11-bit identifier, with the interframe space and an estimate of the stuff bits. The estimate
-/// is one stuff bit for sixteen bits, which lies between the numbers for counting data and for zeros.
-fn bits(frame: &Frame) -> u64 {
-    let data = if frame.is_remote() { 0 } else { 8 * frame.len() as u64 };
-    47 + data + (34 + data) / 16
-}
-
 impl Count {
     pub(super) fn add(&mut self, frame: &Frame) {
         self.frames = self.frames.saturating_add(1);
-        self.bits += bits(frame);
+        self.bits += load::bits(if frame.is_remote() { 0 } else { frame.len() });
         self.total += 1;
     }
 

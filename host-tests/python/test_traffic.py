@@ -1,0 +1,112 @@
+"""`nodectl trace --by-id`, `replay` and `map --dbc`, judged by python-can's reader of logs and by cantools."""
+
+import json
+import os
+import subprocess
+from collections import Counter
+
+import can
+import cantools
+import pytest
+from simulator import Master, Simulator
+
+
+def nodectl(*words, simulator: Simulator | None = None) -> str:
+    """Runs a command, and returns its output."""
+    bus = ["--bus", f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"] if simulator else []
+    done = subprocess.run([os.environ["NODECTL_COMMAND"], *bus, *map(str, words)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A second of a bus with SDO transfers, TPDOs and heartbeats."""
+    log = tmp_path_factory.mktemp("traffic") / "bus.log"
+    simulator = Simulator("--bitrate", "250", "--candump", str(log))
+    master = Master(simulator)
+    master.write(0x1017, 0, 100, 2)
+    master.write(0x1800, 5, 20, 2)
+    pdos = master.listen(0x181)
+    master.node.nmt.send_command(0x01)
+    for _ in range(50):
+        pdos.next()
+    assert master.read(0x1018, 2) == 1
+    master.close()
+    simulator.quit()
+    return log
+
+
+def test_one_line_for_each_can_id(log):
+    frames = list(can.CanutilsLogReader(log))
+    lines = [json.loads(line) for line in nodectl("--json", "--bit-rate", 250, "trace", "--by-id", "--file", log).splitlines()]
+    *rows, bus = lines
+    assert {row["can_id"]: row["count"] for row in rows} == Counter(frame.arbitration_id for frame in frames)
+    assert bus["frames"] == len(frames)
+    for row in rows:
+        own = [frame for frame in frames if frame.arbitration_id == row["can_id"]]
+        assert row["data"] == own[-1].data.hex(" ").upper() and row["length"] == own[-1].dlc
+        gaps = [after.timestamp - before.timestamp for before, after in zip(own, own[1:])]
+        if gaps:
+            wanted = [1000 * time for time in (sum(gaps) / len(gaps), min(gaps), max(gaps))]
+            assert [row["period"], row["shortest"], row["longest"]] == pytest.approx(wanted, abs=0.002)
+    # Without stuff bits, a frame has 47 bits and its data.
+    bits = sum(47 + 8 * frame.dlc for frame in frames)
+    seconds = frames[-1].timestamp - frames[0].timestamp
+    least = 100 * bits / (seconds * 250_000)
+    assert least <= bus["load_percent"] <= 1.2 * least
+    assert bus["load_percent"] <= bus["peak_percent"] <= 100
+
+
+def test_a_log_is_sent_again(log):
+    frames = list(can.CanutilsLogReader(log))
+    requests = [frame for frame in frames if frame.arbitration_id == 0x601]
+    simulator = Simulator("--bitrate", "250")
+    bus = simulator.bus()
+    done = json.loads(nodectl("--json", "replay", log, "--id", "601", "--speed", 2, simulator=simulator))
+    assert done == {"frames": len(requests), "left_out": len(frames) - len(requests)}
+    # The client that listens gets every frame; the node answers each request.
+    seen = []
+    while sum(message.arbitration_id == 0x581 for message in seen) < len(requests):
+        message = bus.recv(10)
+        assert message is not None, seen
+        seen.append(message)
+    sent = [message.data for message in seen if message.arbitration_id == 0x601]
+    assert sent == [frame.data for frame in requests]
+    bus.shutdown()
+    master = Master(simulator)
+    assert (master.read(0x1017, 0), master.read(0x1800, 5)) == (100, 20)
+    master.close()
+    simulator.quit()
+
+
+@pytest.mark.parametrize("personality", ["pressure", "encoder", "combined", "lift"])
+def test_a_dbc_file_decodes_the_pdos(personality, tmp_path):
+    simulator = Simulator("--bitrate", "250", "--node", f"1:{personality}")
+    master = Master(simulator)
+    file = tmp_path / "bus.dbc"
+    nodectl("map", "--dbc", file, "--node", 1, simulator=simulator)
+    database = cantools.database.load_file(file)
+    assert [node.name for node in database.nodes] == ["Node1"]
+    for message in database.messages:
+        number = int(message.name.removeprefix("Node1_TPDO"))
+        communication, mapping = 0x1800 + number - 1, 0x1A00 + number - 1
+        assert message.frame_id == master.read(communication, 1) & 0x7FF
+        mapped = [master.read(mapping, sub) for sub in range(1, master.read(mapping, 0) + 1)]
+        assert message.length == (sum(entry & 0xFF for entry in mapped) + 7) // 8
+        starts = [sum(entry & 0xFF for entry in mapped[:place]) for place in range(len(mapped))]
+        signals = [(signal.start, signal.length) for signal in message.signals]
+        numbers = [(start, entry & 0xFF) for start, entry in zip(starts, mapped)]
+        assert set(signals) <= set(numbers) and signals
+        values = message.decode(bytes(message.length))
+        assert set(values) == {signal.name for signal in message.signals}
+    assert database.messages
+    if personality == "pressure":
+        pdos = master.listen(0x181)
+        master.write(0x1800, 5, 100, 2)
+        master.node.nmt.send_command(0x01)
+        values = list(database.get_message_by_frame_id(0x181).decode(pdos.next()).values())
+        # The simulator begins with a pressure within the range, at room temperature.
+        assert 0 <= values[0] <= 10 and -50 < values[1] < 100
+    master.close()
+    simulator.quit()
