@@ -18,6 +18,11 @@ const SLOWEST: usize = 12;
 /// Tests that mostly wait run beside the others: this many for each core.
 const WAITING: usize = 2;
 
+/// How far work steps back where the cores are short, as the nice value of Linux: tests with the clock of a real board
+/// come first, then the other tests, then lints and documentation.
+const TESTS: i32 = 5;
+const LANES: i32 = 15;
+
 /// The period of printing the number of finished tests.
 const PERIOD: Duration = Duration::from_secs(20);
 
@@ -114,14 +119,21 @@ impl<'a> Report<'a> {
     /// tests per core that mostly wait.
     pub(super) fn run(&self, lanes: [Vec<Step>; 2], tests: Vec<Step>) -> Result<()> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
-        let pool = Pool::new(tests);
+        let pool = &Pool::new(tests);
         thread::scope(|scope| {
             for lane in lanes {
-                scope.spawn(|| self.lane(lane));
+                scope.spawn(|| {
+                    step_back(LANES);
+                    self.lane(lane);
+                });
             }
-            for (queue, number) in [(&pool.busy, workers), (&pool.waiting, WAITING * workers)] {
+            let queues = [(&pool.busy, workers, TESTS), (&pool.waiting, WAITING * workers, 0)];
+            for (queue, number, nice) in queues {
                 for _ in 0..number {
-                    scope.spawn(|| pool.work(queue, |test| self.step(test, true)));
+                    scope.spawn(move || {
+                        step_back(nice);
+                        pool.work(queue, |test| self.step(test, true));
+                    });
                 }
             }
         });
@@ -193,6 +205,14 @@ impl<'a> Report<'a> {
         println!("{passed} passed, 0 failed");
         Ok(())
     }
+}
+
+/// Raises the nice value of this thread and of the programs that it starts. Elsewhere than on Linux all have the same.
+fn step_back(nice: i32) {
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::nice(nice);
+    #[cfg(not(target_os = "linux"))]
+    let _ = nice;
 }
 
 /// Saves the time of each step, so that the next run can begin with the slowest tests. Steps that have not run keep
