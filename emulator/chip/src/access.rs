@@ -2,12 +2,12 @@
 
 use canbus::Time;
 
+use crate::breach::Breach;
 use crate::lane::Lane;
 use crate::loss::Loss;
 use crate::map::{self, Block, Unit};
 use crate::peripherals::BusFault;
 use crate::rcc::Rcc;
-use crate::breach::Breach;
 use crate::signature;
 use crate::stm32f4::Stm32f4;
 use crate::unmodelled::{Direction, Reason};

@@ -2,6 +2,7 @@
 
 use canbus::Time;
 
+use crate::breach::Breach;
 use crate::can::Lines;
 use crate::clocks::Apb;
 use crate::iwdg::Iwdg;
@@ -9,7 +10,6 @@ use crate::loss::Loss;
 use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
 use crate::peripherals::{BusFault, Effect, FlashAccess, IrqLines, Memory, Peripherals};
 use crate::rcc::Cause;
-use crate::breach::Breach;
 use crate::spi::Far;
 use crate::stm32f4::Stm32f4;
 use crate::timer::{LSI_CHANNEL, Timer};
