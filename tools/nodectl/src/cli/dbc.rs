@@ -23,8 +23,10 @@ pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Res
         session.begin_all();
         let catalogue = session.catalogue(*node)?;
         let found = tpdo::read(&mut session.client(*node), &catalogue);
-        for tpdo in found.map_err(|error| session.named(error))? {
-            message(session, *node, &catalogue, &tpdo, &mut messages, &mut kinds)?;
+        let found = found.map_err(|error| session.named(error))?;
+        // A multiplexed PDO maps nothing: each of its frames names its object.
+        for tpdo in found.iter().filter(|tpdo| !tpdo.mapping.is_empty()) {
+            message(session, *node, &catalogue, tpdo, &mut messages, &mut kinds)?;
         }
     }
     let names: Vec<String> = nodes.iter().map(|node| format!("Node{}", node.get())).collect();
