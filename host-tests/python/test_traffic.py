@@ -85,10 +85,11 @@ def test_a_log_is_sent_again(log):
 @pytest.mark.parametrize("personality", ["pressure", "encoder", "combined", "lift"])
 def test_a_dbc_file_decodes_the_pdos(personality, tmp_path):
     simulator = Simulator("--bitrate", "250", "--node", f"1:{personality}", "--pressure", "const:250000")
-    master = Master(simulator)
+    Master(simulator).close()
     file = tmp_path / "bus.dbc"
     nodectl("map", "--dbc", file, "--node", 1, simulator=simulator)
     database = cantools.database.load_file(file)
+    master = Master(simulator)
     assert [node.name for node in database.nodes] == ["Node1"]
     for message in database.messages:
         number = int(message.name.removeprefix("Node1_TPDO"))

@@ -1,5 +1,5 @@
 //! What `nodectl` and the simulator have in common: CAN frames as text, in the lines of [`slcan`] and the messages of
-//! [`socketcand`], in both directions; and the names of physical [`unit`]s.
+//! [`socketcand`], in both directions; and the names of physical [`mod@unit`]s.
 //!
 //! `nodectl` is a client of these protocols and the simulator a server, so each has a frame type of its own. A codec takes any
 //! [`embedded_can::Frame`]: with a type that has base frames only, an extended frame is no frame. Connections, answers and what a
