@@ -45,9 +45,10 @@ impl Boot {
         self.since.is_some()
     }
 
-    /// Whether a boot-up message was seen.
-    pub(crate) fn has_booted(&self) -> bool {
-        self.has_booted
+    /// Whether a boot-up message may be next although no restart was seen: the first one, or that of a node which was told
+    /// to restart itself.
+    pub(crate) fn may_be_starting(&self) -> bool {
+        !self.has_booted || self.has_reason || self.is_updated
     }
 
     /// A boot-up message. Returns whether the restart was not seen before it.

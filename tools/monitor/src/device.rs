@@ -193,7 +193,7 @@ impl Device {
         self.errors.advance(inhibit, now, findings);
     }
 
-    /// The SDO request of a client to the node with this node-ID. Before the boot-up message, the node may miss it, or
+    /// The SDO request of a client to the node with this node-ID. Before a boot-up message, the node may miss it, or
     /// answer after the message.
     pub(crate) fn request(&mut self, node: u8, data: &[u8], now: Instant) {
         if self.id.is_some_and(|id| id != node) {
@@ -203,7 +203,7 @@ impl Device {
         if is_running {
             self.take_request(data, now);
         }
-        if !is_running || !self.boot.has_booted() {
+        if !is_running || self.boot.may_be_starting() {
             self.early.extend(data.try_into().ok().map(|data| (node, data)));
         }
     }

@@ -157,6 +157,21 @@ fn a_request_before_the_boot_up_message_may_be_answered_after_it() {
     assert!(breaches_of(&again).contains("a response without a request"));
 }
 
+/// A bootloader answers the start of a program, and restarts later.
+#[test]
+fn a_request_to_a_node_that_restarts_itself_may_be_answered_after_its_boot_up_message() {
+    let start: (u16, &[u8]) = (0x605, &[0x2F, 0x51, 0x1F, 1, 1, 0, 0, 0]);
+    let started: (u16, &[u8]) = (0x585, &[0x60, 0x51, 0x1F, 1, 0, 0, 0, 0]);
+    let abort: (u16, &[u8]) = (0x605, &[0x80, 0x00, 0x10, 0, 0, 0, 4, 5]);
+    let before = [(1_000, BOOT_UP), (2_000, start), (3_000, started)];
+    let once = [(10_000, READ), (20_000, BOOT_UP), (21_000, ANSWER)];
+    let twice = [(10_000, READ), (18_000, abort), (19_000, READ), (20_000, BOOT_UP), (21_000, ANSWER)];
+    for after in [once.as_slice(), &twice] {
+        let frames: Vec<_> = before.iter().chain(after).map(|(at, (id, data))| (*at, *id, *data)).collect();
+        assert_eq!(breaches_of(&frames), "");
+    }
+}
+
 #[test]
 fn requests_in_a_row_have_as_many_answers_at_most() {
     let (boot_up, read, answer) = ((1_000, BOOT_UP), READ, ANSWER);
