@@ -18,7 +18,7 @@ fn start(example: &str, hse: Option<u64>) -> Machine<Stm32f4> {
 /// A chip that runs a program without the bootloader.
 pub(crate) fn start_program(name: &str, hse: Option<u64>) -> Machine<Stm32f4> {
     let elf = std::fs::read(images().join(name)).unwrap();
-    let chip = Stm32f4::new(Variant::F446, Board { hse, ..Board::default() });
+    let chip = Stm32f4::new(Variant::F446, Board { hse, hse_is_clock: false, ..Board::default() });
     let mut machine = Machine::new(Model::stm32f4(Variant::F446.flash_size()), chip).unwrap();
     machine.load_elf(&elf).unwrap();
     machine.power_on(Time::ZERO);
