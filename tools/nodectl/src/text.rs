@@ -48,6 +48,11 @@ pub fn hex_digits(bytes: &[u8], separator: &str) -> String {
     out
 }
 
+/// A number with the word for one or for several: `1 node is`, `2 nodes are`.
+pub(crate) fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
+
 fn is_control(char: char) -> bool {
     let hides = matches!(u32::from(char), 0x200B..=0x200F | 0x2028..=0x202E | 0x2060..=0x206F | 0xFEFF);
     char.is_control() || hides

@@ -17,7 +17,7 @@ use super::{Failure, Session};
 use crate::configuration::{Configuration, Difference, Write, is_unclear, node_of, plan};
 use crate::object::{Place, at};
 use crate::sdo::AbortCode;
-use crate::text::{note, visible};
+use crate::text::{counted, note, visible};
 use crate::value::Value;
 
 /// Writes the configuration of a node to a file: a DCF with the values that differ from the defaults.
@@ -300,7 +300,9 @@ impl fmt::Display for Done {
         let saved = if self.saved { ", saved" } else { "" };
         match self.writes {
             0 => write!(f, "node {}: has it already{saved}", self.node),
-            writes => write!(f, "node {}: {writes} writes, read back{saved}", self.node),
+            writes => {
+                write!(f, "node {}: {}, read back{saved}", self.node, counted(writes, "write", "writes"))
+            }
         }
     }
 }

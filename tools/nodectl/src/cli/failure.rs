@@ -11,6 +11,7 @@ use crate::acquisition::Interruption;
 use crate::bus::BusError;
 use crate::object::Place;
 use crate::sdo::{self, Cause};
+use crate::text::counted;
 use crate::{lss, update};
 
 /// The exit codes, for the end of the help text.
@@ -68,10 +69,10 @@ pub enum Failure {
         exit_code: u8,
     },
     /// Two configurations differ.
-    #[error("{0} parameters differ")]
+    #[error("{}", counted(*.0, "parameter differs", "parameters differ"))]
     Different(usize),
     /// Checks have failed, or the device has not taken back a changed value; both have been printed already.
-    #[error("{failed} checks failed{}", left_words(.left_behind))]
+    #[error("{}{}", counted(*.failed, "check failed", "checks failed"), left_words(.left_behind))]
     NotConforming {
         /// The number of failed checks.
         failed: usize,
@@ -79,10 +80,10 @@ pub enum Failure {
         left_behind: Vec<String>,
     },
     /// Rules of the bus are broken; each breach has been printed already.
-    #[error("{0} breaches of the rules of the bus")]
+    #[error("{}", counted(*.0, "breach of the rules of the bus", "breaches of the rules of the bus"))]
     RulesBroken(usize),
     /// The bus is not as its file says; each finding has been printed already.
-    #[error("{0} findings: the bus is not as its file says")]
+    #[error("the bus is not as its file says: {}", counted(*.0, "finding", "findings"))]
     NotAsPlanned(usize),
     /// A node has other values than the values that were written.
     #[error("still different after it was written: {0}")]

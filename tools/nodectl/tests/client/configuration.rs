@@ -87,7 +87,7 @@ fn files_are_compared_with_each_other() {
     printed(&wire, &["dump", &dump]);
     let (lines, result) = run(&wire, &["diff", sheet, &dump]);
     assert_eq!(lines, "1017h:0 Producer heartbeat time: 1000 -> 250\n");
-    assert_eq!(result.unwrap_err().to_string(), "1 parameters differ");
+    assert_eq!(result.unwrap_err().to_string(), "1 parameter differs");
 }
 
 #[test]

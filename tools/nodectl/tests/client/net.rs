@@ -197,7 +197,7 @@ fn a_date_spares_the_comparison_and_is_written_last() {
     let file = file.to_str().unwrap();
     assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: 3 writes, read back, saved\n");
     assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: has the configuration of this date\n");
-    assert_eq!(printed(&wire, &["net", "check", file]), "1 nodes are as the file says\n");
+    assert_eq!(printed(&wire, &["net", "check", file]), "1 node is as the file says\n");
     assert_eq!(
         printed(&wire, &["read", "1020:1", "-n", "5"]).split(" = ").nth(1),
         Some("15668 (00003D34h)\n")

@@ -15,6 +15,7 @@ use crate::net::{Date, Plan, PlannedNode, Start};
 use crate::nmt::send;
 use crate::object::at;
 use crate::scan::scan;
+use crate::text::counted;
 
 /// A node that has its configuration.
 #[derive(Serialize)]
@@ -146,7 +147,7 @@ impl fmt::Display for Done {
         let what = match self.writes {
             _ if self.has_date => "has the configuration of this date".to_owned(),
             0 => "has it already".to_owned(),
-            writes => format!("{writes} writes, read back"),
+            writes => format!("{}, read back", counted(writes, "write", "writes")),
         };
         write!(f, "node {}: {what}{saved}{started}", self.node)
     }

@@ -16,7 +16,7 @@ use crate::heartbeat;
 use crate::net::{Date, Plan, PlannedNode, Start};
 use crate::object::{Place, at};
 use crate::scan::{Presence, scan};
-use crate::text::visible;
+use crate::text::{counted, visible};
 use crate::value::Value;
 
 /// The nodes that a scan has found.
@@ -30,7 +30,7 @@ struct Fine {
 
 impl Display for Fine {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{} nodes are as the file says", self.nodes)
+        write!(f, "{} as the file says", counted(self.nodes, "node is", "nodes are"))
     }
 }
 

@@ -12,6 +12,7 @@ use super::check::{date, is_there};
 use super::{Failure, LISTEN, Session};
 use crate::object::at;
 use crate::scan::scan;
+use crate::text::counted;
 
 #[derive(Serialize)]
 struct Done {
@@ -81,6 +82,7 @@ fn add(session: &mut Session, node: NodeId, file: &Path, text: &mut String) -> R
 
 impl fmt::Display for Done {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: {} nodes, {} with a configuration file", self.file, self.nodes, self.configurations)
+        let nodes = counted(self.nodes, "node", "nodes");
+        write!(f, "{}: {nodes}, {} with a configuration file", self.file, self.configurations)
     }
 }

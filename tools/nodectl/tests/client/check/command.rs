@@ -59,7 +59,7 @@ fn a_device_that_does_not_conform_is_9_and_the_reports_say_why() {
         [&["--node", "5", "--eds", &eds, "check", "--only", "DIC-10,DIC-11,ERR-01"][..], &files].concat();
     let (table, result) = run(&wire, &line);
     let failure = result.expect_err("a failure");
-    assert_eq!((failure.exit_code(), failure.to_string().as_str()), (9, "1 checks failed"));
+    assert_eq!((failure.exit_code(), failure.to_string().as_str()), (9, "1 check failed"));
     assert!(
         table.contains("CiA 306, 4.6.3\n") && table.contains("expected: the value of the data sheet\n"),
         "{table}"
