@@ -119,6 +119,7 @@ pub(super) const STORES: &[Row] = &[
     wrong("APB2 not divided", CFGR, 0b111 << 13, 0, "PCLK2 at 144000000 Hz"),
     wrong("clock taken for a crystal", RCC, 1 << 18, 0, "HSE is switched on for a crystal"),
     wrong("regulator at scale 3", PWR_CR, 0b11 << 14, 0b01 << 14, "HCLK at 144000000 Hz"),
+    wrong("PLL fed by HSI", PLLCFGR, 1 << 22, 0, "the input of the PLL at 4000000 Hz"),
     // Clocks of peripherals.
     wrong("GPIOB without clock", AHB1ENR, 1 << 1, 0, "GPIOB is accessed without its clock"),
     wrong("CAN1 without clock", APB1ENR, 1 << 25, 0, "CAN1 is accessed without its clock"),
@@ -138,6 +139,8 @@ pub(super) const STORES: &[Row] = &[
     wrong("pressure input not analogue", GPIOA, 0b11, 0, "PA0 is not switched to analogue"),
     wrong("encoder on AF1", GPIOB + AFRL, 0xFF << 24, 0x11 << 24, "the position is").with(Node::Encoder),
     wrong("SPI2 on AF6", GPIOB + AFRH, 0xFF << 20, 0x66 << 20, "the position is").with(Node::Absolute),
+    wrong("standby pin of the transceiver an input", GPIOB, 0b11 << 24, 0, "its transceiver asleep: PB12"),
+    wrong("SSI clock pin an input", GPIOB, 0b11 << 26, 0, "the position is").with(Node::Absolute),
     // CAN.
     wrong("one quantum less before the sample point", CAN1 + 0x1C, 0xF << 16, 13 << 16, "errors on the bus"),
     wrong("half the bit rate", CAN1 + 0x1C, 0x3FF, 3, "errors on the bus"),
@@ -159,6 +162,11 @@ pub(super) const STORES: &[Row] = &[
         1 << 12,
         "CAN joins the bus with its transceiver asleep: PB12",
     ),
+    wrong("CAN never leaves its initialisation", CAN1, 1 << 0, 1 << 0, "0 boot-up messages instead of one"),
+    wrong("CAN left asleep", CAN1, 1 << 1, 1 << 1, "0 boot-up messages instead of one"),
+    wrong("filters of FIFO 1 lead to FIFO 0", CAN1 + 0x214, u32::MAX, 0, "no answer to SDO"),
+    wrong("filters of FIFO 0 lead to FIFO 1", CAN1 + 0x214, u32::MAX, 0x0FFF_FFFF, "the pressure is None"),
+    wrong("filters left in their initialisation", CAN1 + 0x200, 1, 1, "no answer to SDO"),
     // ADC and DMA.
     wrong("temperature sampled for 3 cycles", ADC1 + 0x0C, 0b111 << 24, 0, "ADC channel 18 is sampled for"),
     wrong(
@@ -197,6 +205,20 @@ pub(super) const STORES: &[Row] = &[
     wrong("DMA moves bytes", DMA2 + 0x10, 0b1111 << 11, 0, "the pressure is"),
     wrong("DMA moves half as much", DMA2 + 0x14, u32::MAX, 80, "samples a second"),
     missing("flags of the DMA are not cleared", DMA2 + 0x08, "reset by the chip (watchdog)"),
+    wrong("ADC left-aligned", ADC1 + 0x08, 1 << 11, 1 << 11, "the pressure is"),
+    wrong("ADC triggered by another timer", ADC1 + 0x08, 0xF << 24, 0, "reset by the chip (watchdog)"),
+    wrong("ADC converts the supply first", ADC1 + 0x34, 0x1F, 1, "the pressure is"),
+    wrong("ADC never switched on", ADC1 + 0x08, 1 << 0, 0, "reset by the chip (watchdog)"),
+    wrong("DMA of another channel", DMA2 + 0x10, 0b111 << 25, 3 << 25, "reset by the chip (watchdog)"),
+    wrong("DMA from memory", DMA2 + 0x10, 0b11 << 6, 0b01 << 6, "reset by the chip (watchdog)"),
+    wrong(
+        "DMA steps through registers",
+        DMA2 + 0x10,
+        1 << 9,
+        1 << 9,
+        "ADC1+0x50 (0x40012050) read: not modelled",
+    ),
+    wrong("DMA never enabled", DMA2 + 0x10, 1 << 0, 0, "reset by the chip (watchdog)"),
     // Timers.
     wrong("scans too fast", TIM3 + 0x2C, u32::MAX, 2249, "samples a second"),
     wrong("time base at half its rate", TIM2 + 0x28, u32::MAX, 143, "heartbeats instead of 5"),
@@ -204,6 +226,10 @@ pub(super) const STORES: &[Row] = &[
     wrong("encoder counts one phase", TIM4 + 0x08, 0b111, 1, "the position is").with(Node::Encoder),
     wrong("encoder counts to 4095", TIM4 + 0x2C, u32::MAX, 0xFFF, "the position is").with(Node::Encoder),
     wrong("counts are not copied", TIM3 + 0x0C, 1 << 8, 0, "samples a second").with(Node::Encoder),
+    wrong("scans never start", TIM3, 1 << 0, 0, "reset by the chip (watchdog)"),
+    wrong("scans do not trigger the ADC", TIM3 + 0x04, 0b111 << 4, 0, "reset by the chip (watchdog)"),
+    wrong("time base stopped", TIM2, 1 << 0, 0, "reset by the chip (watchdog)"),
+    wrong("encoder stopped", TIM4, 1 << 0, 0, "the position is").with(Node::Encoder),
     // SPI.
     wrong("SSI clock idles low", SPI2, 1 << 1, 0, "the position is").with(Node::Absolute),
     wrong("SSI sampled at the first edge", SPI2, 1 << 0, 0, "the position is").with(Node::Absolute),
@@ -219,6 +245,8 @@ pub(super) const STORES: &[Row] = &[
     wrong("SPI without DMA", SPI2 + 0x04, 0b11, 0, "the position is").with(Node::Absolute),
     missing("flags of DMA1 are not cleared", DMA1 + 0x08, "stream 3 of DMA1 begins with flags")
         .with(Node::Absolute),
+    wrong("SSI lowest bit first", SPI2, 1 << 7, 1 << 7, "the position is").with(Node::Absolute),
+    wrong("SPI never enabled", SPI2, 1 << 6, 0, "the position is").with(Node::Absolute),
     // Flash.
     wrong("voltage detector off", PWR_CR, 1 << 4, 0, "what was saved is lost").with(Node::LowSupply),
     missing("flash not unlocked", FLASH_KEYR, "a save is refused").with(Node::Saving),
@@ -302,5 +330,76 @@ pub(super) const CODE: &[Row] = &[
         SAMPLING,
         &[0xF64E, 0x5088, 0xF2CE, 0x0000, 0x2100, 0x6001, 0xF3BF, 0x8F4F, 0xF3BF, 0x8F6F, 0xEE30, 0x0A00],
         "CFSR 0x80000",
+    ),
+    // movw r0, #0x0002; movt r0, #0x2000; vldr s0, [r0]
+    code(
+        "a float at an odd half",
+        SAMPLING,
+        &[0xF240, 0x0002, 0xF2C2, 0x0000, 0xED90, 0x0A00],
+        "CFSR 0x1000000",
+    )
+    .with(Node::Interleaved),
+    // movw r0, #0x0002; movt r0, #0x2000; ldm r0, {r1, r2}
+    code(
+        "words at an odd half",
+        SAMPLING,
+        &[0xF240, 0x0002, 0xF2C2, 0x0000, 0xE890, 0x0006],
+        "CFSR 0x1000000",
+    )
+    .with(Node::Interleaved),
+    // movw r0, #0x0002; movt r0, #0x2000; ldrex r1, [r0]
+    code(
+        "an exclusive load at an odd half",
+        SAMPLING,
+        &[0xF240, 0x0002, 0xF2C2, 0x0000, 0xE850, 0x1F00],
+        "CFSR 0x1000000",
+    )
+    .with(Node::Interleaved),
+    // CCR, DIV_0_TRP: movw r0, #0xED14; movt r0, #0xE000; ldr r1, [r0]; orr r1, #0x10; str r1, [r0]; dsb; isb; movs r2, #0; udiv r1, r1, r2
+    code(
+        "a division by zero that is trapped",
+        SAMPLING,
+        &[
+            0xF64E, 0x5014, 0xF2CE, 0x0000, 0x6801, 0xF041, 0x0110, 0x6001, 0xF3BF, 0x8F4F, 0xF3BF, 0x8F6F,
+            0x2200, 0xFBB1, 0xF1F2,
+        ],
+        "CFSR 0x2000000",
+    )
+    .with(Node::Interleaved),
+    // mvn lr, #10; bx lr
+    code("an exception return that is none", SAMPLING, &[0xF06F, 0x0E0A, 0x4770], "CFSR 0x40000"),
+    // mov r0, #0x40000000; orr r0, #1; bx r0
+    code(
+        "a call into the peripherals",
+        SAMPLING,
+        &[0xF04F, 0x4080, 0xF040, 0x0001, 0x4700],
+        "fault at 0x40000000, CFSR 0x100",
+    ),
+    // mov r0, #0x20000000; orr r0, #1; bx r0
+    code("a call into the RAM", SAMPLING, &[0xF04F, 0x5000, 0xF040, 0x0001, 0x4700], "fault at 0x2000"),
+    // Interrupt 63, CAN2_TX, is enabled and pended: movw r0, #0xE204; movt r0, #0xE000; mov r1, #0x80000000; movw r2, #0xE104; movt r2, #0xE000; str r1, [r2]; str r1, [r0]; bx lr
+    code(
+        "an interrupt without a handler",
+        SAMPLING,
+        &[
+            0xF24E, 0x2004, 0xF2CE, 0x0000, 0xF04F, 0x4100, 0xF24E, 0x1204, 0xF2CE, 0x0200, 0x6011, 0x6001,
+            0x4770,
+        ],
+        "reset by software",
+    ),
+    // cpsid i; bx lr
+    code("interrupts masked for ever", SAMPLING, &[0xB672, 0x4770], "reset by the chip (watchdog)"),
+    // cpsid f; b .
+    code("faults masked in a loop", SAMPLING, &[0xB671, 0xE7FE], "reset by the chip (watchdog)"),
+    // movs r0, #0; str r0, [r0]; b .
+    code("a store to a null pointer", SAMPLING, &[0x2000, 0x6000, 0xE7FE], "access to 0x00000000"),
+    // movs r0, #0; msr msp, r0; push {r0}; b .
+    code("a stack at zero", SAMPLING, &[0x2000, 0xF380, 0x8808, 0xB401, 0xE7FE], "CFSR 0x1000"),
+    // movw r0, #0x7400; movt r0, #0x4000; ldr r1, [r0]; bx lr
+    code(
+        "a register of a peripheral without its clock",
+        SAMPLING,
+        &[0xF247, 0x4000, 0xF2C4, 0x0000, 0x6801, 0x4770],
+        "DAC is accessed without its clock",
     ),
 ];
