@@ -55,8 +55,8 @@ def test_the_host_learns_of_127_nodes(bench):
 
 
 def test_the_host_reads_another_node_through_the_gateway(bench):
-    bench.start("io_module", 9)
     bench.listen(0x709)
+    bench.start("io_module", 9)
     assert bench.next(0x709) == b"\x00"
     bench.program.command("read", 9, "1008", 0)
     assert bench.program.line() == "value " + b"I/O module".hex()
