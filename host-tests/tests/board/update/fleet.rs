@@ -8,8 +8,6 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use canbus::Time;
 use clap::Parser;
 use host_tests::thorough::either;
-use host_tests::watch::expects;
-use monitor::Rule;
 use nodectl::cli::Cli;
 use programmer::sign::image::Image;
 use serde_json::{Value, json};
@@ -180,7 +178,6 @@ fn nodectl_confirms_or_rolls_back_a_program_on_trial() {
 /// bootloader refuses it.
 #[test]
 fn an_image_for_another_board_is_refused_with_force_and_by_the_bootloader() {
-    let _expected = expects([Rule::SdoProtocol]);
     const BOARD: u8 = 64;
     for (personality, kbit) in PERSONALITIES.into_iter().zip([125, 250, 500, 1000]) {
         let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
