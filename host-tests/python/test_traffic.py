@@ -8,15 +8,7 @@ from collections import Counter
 import can
 import cantools
 import pytest
-from simulator import Master, Simulator
-
-
-def nodectl(*words, simulator: Simulator | None = None) -> str:
-    """Runs a command, and returns its output."""
-    bus = ["--bus", f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"] if simulator else []
-    done = subprocess.run([os.environ["NODECTL_COMMAND"], *bus, *map(str, words)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+from simulator import Master, Simulator, nodectl
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +31,9 @@ def log(tmp_path_factory):
 
 def test_one_line_for_each_can_id(log):
     frames = list(can.CanutilsLogReader(log))
-    lines = [json.loads(line) for line in nodectl("--json", "--bit-rate", 250, "trace", "--by-id", "--file", log).splitlines()]
+    command = [os.environ["NODECTL_COMMAND"], "--json", "--bit-rate", "250", "trace", "--by-id", "--file", log]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    lines = [json.loads(line) for line in output.splitlines()]
     *rows, bus = lines
     assert {row["can_id"]: row["count"] for row in rows} == Counter(frame.arbitration_id for frame in frames)
     assert bus["frames"] == len(frames)
@@ -64,10 +58,11 @@ def test_a_log_is_sent_again(log):
     # A client aborts a transfer whose request came before the node's boot-up; nothing answers an abort.
     wanted = sum(frame.data[0] != 0x80 for frame in requests)
     simulator = Simulator("--bitrate", "250")
-    master = Master(simulator)
+    Master(simulator).close()
     bus = simulator.bus()
-    done = json.loads(nodectl("--json", "replay", log, "--id", "601", "--speed", 2, simulator=simulator))
-    assert done == {"frames": len(requests), "left_out": len(frames) - len(requests)}
+    replay = nodectl(simulator, "--json", "replay", log, "--id", "601", "--speed", "2")
+    assert replay.returncode == 0, replay.stderr
+    assert json.loads(replay.stdout) == {"frames": len(requests), "left_out": len(frames) - len(requests)}
     # A client that listens gets the frames in their order, and the answers.
     sent, answers = [], 0
     while (len(sent), answers) != (len(requests), wanted):
@@ -77,6 +72,8 @@ def test_a_log_is_sent_again(log):
         answers += message.arbitration_id == 0x581
     assert sent == [frame.data for frame in requests]
     bus.shutdown()
+    # A client on the bus before would take the answers of the log for its own.
+    master = Master(simulator)
     assert (master.read(0x1017, 0), master.read(0x1800, 5)) == (100, 20)
     master.close()
     simulator.quit()
@@ -87,7 +84,8 @@ def test_a_dbc_file_decodes_the_pdos(personality, tmp_path):
     simulator = Simulator("--bitrate", "250", "--node", f"1:{personality}", "--pressure", "const:250000")
     Master(simulator).close()
     file = tmp_path / "bus.dbc"
-    nodectl("map", "--dbc", file, "--node", 1, simulator=simulator)
+    done = nodectl(simulator, "map", "--dbc", file)
+    assert done.returncode == 0, done.stderr
     database = cantools.database.load_file(file)
     master = Master(simulator)
     assert [node.name for node in database.nodes] == ["Node1"]

@@ -12,6 +12,7 @@ use crate::trace::{Kind, Line};
 
 /// The time over which the peak of the load is measured, in microseconds.
 const WINDOW: u64 = 100_000;
+
 /// The frames of all CAN-IDs.
 #[derive(Default)]
 pub(super) struct ByCanId {
@@ -192,7 +193,7 @@ mod tests {
         assert_eq!(format!("{:.2}", bus.peak_percent), "1.87");
     }
 
-    /// As in a log that was put together from two.
+    /// Two logs in one file, the older one last, have such frames.
     #[test]
     fn a_frame_may_be_older_than_the_one_before() {
         let mut all = ByCanId::default();
