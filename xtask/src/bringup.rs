@@ -6,6 +6,7 @@ use std::process::{Command, ExitCode};
 use anyhow::Result;
 
 use crate::command::{become_program, built, cargo};
+use crate::own_tool::package;
 use crate::setup::{self, emulator};
 use crate::target::Toolchain;
 use crate::{images, progress};
@@ -25,7 +26,7 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     let images = images::compile_node(&Toolchain::ensure()?, images::CHIP)?;
     let name = if is_emulated { "bringup-emulated" } else { "bringup" };
     let mut tool = if is_emulated { emulator::cargo_with_emulator()? } else { cargo() };
-    tool.args(["build", "--profile", "sim", "-p", name]);
+    tool.args(["build", "--profile", "sim", "-p", package(name), "--bin", name]);
     progress::build("tools", &mut tool)?;
     let mut program = Command::new(built(name));
     if is_emulated {

@@ -46,10 +46,32 @@ pub(crate) fn run(tool: &str, arguments: &[OsString]) -> Result<()> {
 }
 
 /// The package that has the program.
-fn package(program: &str) -> &str {
+pub(crate) fn package(program: &str) -> &str {
     match program {
         "flash" | "protect" | "sign" => "programmer",
         "bench" | "bringup-emulated" | "glitch" => "workbench",
         same => same,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_program_is_in_its_package() {
+        let list = command::cargo()
+            .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
+            .current_dir(root())
+            .output()
+            .unwrap();
+        let list: serde_json::Value = serde_json::from_slice(&list.stdout).unwrap();
+        let targets = |package: &serde_json::Value| package["targets"].as_array().unwrap().clone();
+        for program in ["flash", "protect", "sign", "bench", "bringup", "bringup-emulated", "glitch", "callgraph"] {
+            let packages = list["packages"].as_array().unwrap();
+            let own = packages.iter().find(|found| found["name"] == package(program));
+            let has = own.is_some_and(|own| targets(own).iter().any(|target| target["name"] == program));
+            assert!(has, "{program} in {}", package(program));
+        }
     }
 }

@@ -37,7 +37,7 @@ pub enum Outcome {
     Installed,
     /// The program on trial was confirmed.
     Confirmed(Cause),
-    /// The program on trial was taken back after three starts.
+    /// The program on trial was rolled back after three starts.
     Failed,
     /// The program on trial was withdrawn.
     Withdrawn(Cause),
@@ -90,8 +90,8 @@ impl fmt::Display for Outcome {
             Outcome::OnTrial => f.write_str("on trial"),
             Outcome::Installed => f.write_str("installed without a trial"),
             Outcome::Confirmed(cause) => write!(f, "confirmed by {cause}"),
-            Outcome::Failed => f.write_str("taken back after three starts"),
-            Outcome::Withdrawn(cause) => write!(f, "taken back by {cause}"),
+            Outcome::Failed => f.write_str("rolled back after three starts"),
+            Outcome::Withdrawn(cause) => write!(f, "rolled back by {cause}"),
             Outcome::Refused(status) => write!(f, "refused: {status}"),
             Outcome::BrokenOff => f.write_str("broken off in the download"),
         }

@@ -14,7 +14,7 @@ pub struct Programs {
     pub counter: u32,
     /// The lowest generation of keys that an image may have.
     pub generation: u32,
-    /// Identification of the newest downloaded program: the program on trial, or the one that was taken back.
+    /// Identification of the newest downloaded program: the program on trial, or the one that was rolled back.
     pub staged: u32,
     /// Identification of the program that was kept before the last update.
     pub kept: u32,

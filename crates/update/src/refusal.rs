@@ -66,7 +66,7 @@ pub enum Refusal {
         /// Cause of the failure.
         reason: Reason,
     },
-    /// The application is on trial: it must be confirmed or taken back before the next update.
+    /// The application is on trial: it must be confirmed or rolled back before the next update.
     OnTrial,
     /// Staging has been cleared too often: see [`crate::Clears`].
     Worn,

@@ -68,10 +68,10 @@ impl fmt::Display for Status {
             69 => f.write_str("the download went on after the end of the image"),
             70 => write!(f, "the application crashed {detail} times without confirming itself"),
             72 if detail == 1 => f.write_str(
-                "the new program started three times without being confirmed; the one before is back",
+                "the new program started three times without being confirmed; the previous program runs again",
             ),
             72 => f.write_str(
-                "the new program was not confirmed in time, or was taken back; the one before is back",
+                "the new program was not confirmed in time, or was rolled back; the previous program runs again",
             ),
             73 => f.write_str("the program is on trial: confirm it or take it back before the next update"),
             71 => {

@@ -52,7 +52,7 @@ pub fn world(options: &Options) -> Result<World> {
     let stimuli =
         [pressure, temperature, thermistor, supply, shaft, ssi, button, fault].into_iter().flatten();
     for stimulus in stimuli {
-        world.apply(stimulus).context("a stimulus is for nobody")?;
+        world.apply(stimulus).context("a stimulus")?;
     }
     Ok(world)
 }

@@ -20,8 +20,8 @@ const EFFECTS: [(u16, u8, &str); 7] = [
     (0x1011, 3, "the times of 2002h become the defaults"),
     (0x1F51, 1, "the program stops, and the bootloader runs"),
     (0x2000, 0, "the stored times of 2002h are those of another personality"),
-    (0x2002, 2, "the program is confirmed or taken back"),
-    (0x2002, 3, "the time after which it is taken back"),
+    (0x2002, 2, "the program is confirmed or rolled back"),
+    (0x2002, 3, "the time after which it is rolled back"),
     (0x2002, 4, "the time after which it is confirmed"),
 ];
 

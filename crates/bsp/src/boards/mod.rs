@@ -1,7 +1,7 @@
 //! The boards: one file each, with everything in which it differs from the others. A feature of the crate chooses it.
 //!
 //! The pins of CAN (PB8, PB9), SSI (PB13, PB14), the encoder (PB5 to PB7) and the analogue inputs (PA0, PA1, PC2) are those
-//! of the peripherals and the same on all boards. docs/extending.md says how a board is added.
+//! of the peripherals and the same on all boards. docs/porting.md describes how a board is added.
 
 mod black_f407ve;
 mod front_end;

@@ -1,4 +1,4 @@
-//! Access of the application to the records of an update, to confirm itself or to be taken back.
+//! Access of the application to the records of an update, to confirm itself or to be rolled back.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
 use update::Trial;

@@ -154,8 +154,8 @@ fn trial(state: u32) -> Option<&'static str> {
         1 => {
             "the program is on trial: `nodectl confirm` keeps it, `nodectl rollback` restores the kept program"
         }
-        2 => "the downloaded program was taken back after three starts",
-        3 => "the downloaded program was taken back: it was withdrawn, or not confirmed in time",
+        2 => "the downloaded program was rolled back after three starts",
+        3 => "the downloaded program was rolled back: it was withdrawn, or not confirmed in time",
         _ => return None,
     })
 }

@@ -11,6 +11,7 @@ use super::can_id::can_id;
 use super::node_set::NodeSet;
 use super::traffic::Records;
 use super::{Failure, Session};
+use crate::text::counted;
 use crate::trace::Record;
 
 /// Sends the frames of a log (candump, Vector .asc, PEAK .trc) with their distances in time. The nodes that are on the
@@ -91,7 +92,7 @@ impl Replay {
 
 impl fmt::Display for Done {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} frames sent", self.frames)?;
+        f.write_str(&counted(self.frames, "frame sent", "frames sent"))?;
         if self.left_out > 0 { write!(f, ", {} left out", self.left_out) } else { Ok(()) }
     }
 }

@@ -303,18 +303,19 @@ pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
     let node = node.get();
     match heard {
         Some(Heard { state: Some(State::Stopped), .. }) => {
-            "the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned()
+            format!("the node is stopped and answers no request: `nodectl --node {node} nmt preop` ends this state")
         }
         Some(Heard { state, .. }) => {
             let state =
                 state.map(|state| format!(" (it is {})", heartbeat::words(state))).unwrap_or_default();
             format!(
-                "the node sends{state} and does not answer: its PDOs may leave no room on the bus; \
-                 `nodectl nmt preop -n {node}` ends them, then longer event timers and inhibit times help (1800h:5, 1800h:3)"
+                "the node sends{state} and does not answer. A node that has just started answers the next request. Or its \
+                 PDOs leave no room on the bus: `nodectl --node {node} nmt preop` ends them, then longer event timers and \
+                 inhibit times help (1800h:5, 1800h:3)"
             )
         }
         None => format!(
-            "nothing is heard of node {node}: is it on, with this node-ID and the bit rate of the bus? `nodectl scan` \
+            "node {node} is silent: is it on, with this node-ID and the bit rate of the bus? `nodectl scan` \
              lists the nodes, `nodectl lss scan` those without a node-ID"
         ),
     }

@@ -131,7 +131,7 @@ impl fmt::Display for Report {
         let old = program(&self.old_version, self.old_identification);
         let new = program(&self.new_version, self.new_identification);
         match self.result {
-            "unchanged" => write!(f, "node {}: has {new} already", self.node)?,
+            "unchanged" => write!(f, "node {}: has {new} already; --force downloads it again", self.node)?,
             _ => write!(f, "node {}: {old} -> {new}", self.node)?,
         }
         if self.on_trial { f.write_str(", on trial") } else { Ok(()) }

@@ -415,7 +415,7 @@ fn is_good(status: Status) -> bool {
     status == Status::GOOD
 }
 
-/// Whether a status means that the program has to be confirmed or taken back first.
+/// Whether a status means that the program has to be confirmed or rolled back first.
 fn is_on_trial(status: Status) -> bool {
     status.code == Refusal::OnTrial.code()
 }

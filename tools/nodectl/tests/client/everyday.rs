@@ -111,7 +111,7 @@ fn every_command_has_a_hint_for_a_silent_node() {
         let (code, text) = failed(&wire, &[line, &["-n", "9"]].concat());
         assert_eq!(code, 3);
         assert!(
-            text.contains("nothing is heard of node 9: is it on") && text.contains("nodectl scan"),
+            text.contains("node 9 is silent: is it on") && text.contains("nodectl scan"),
             "{text}"
         );
     }
@@ -123,7 +123,7 @@ fn every_command_recognises_a_node_that_sends_and_does_not_answer() {
         for (id, data) in [(0x709, &[5][..]), (0x189, &[1, 2]), (0x489, &[1]), (0x089, &[0; 8])] {
             let (code, text) = failed(&deaf(id, data), &[line, &["-n", "9"]].concat());
             assert_eq!(code, 3);
-            assert!(text.contains("sends") && text.contains("nodectl nmt preop -n 9"), "{text}");
+            assert!(text.contains("sends") && text.contains("nodectl --node 9 nmt preop"), "{text}");
         }
         let (_, text) = failed(&deaf(0x709, &[4]), &[line, &["-n", "9"]].concat());
         assert!(text.contains("the node is stopped"), "{text}");

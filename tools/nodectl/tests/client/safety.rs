@@ -30,7 +30,7 @@ fn a_node_id_is_not_given_to_more_than_one_node() {
         for line in lines {
             let (code, text) = failed(&wire, line);
             assert_eq!(
-                (code, text.contains("more than one node would take it")),
+                (code, text.contains("more than one node is on the bus")),
                 (2, true),
                 "{line:?}: {text}"
             );

@@ -163,7 +163,7 @@ fn a_node_that_has_taken_the_program_back_says_why() {
     assert!(
         error
             .to_string()
-            .ends_with("the new program started three times without being confirmed; the one before is back"),
+            .ends_with("the new program started three times without being confirmed; the previous program runs again"),
         "{error}"
     );
 }

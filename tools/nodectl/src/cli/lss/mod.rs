@@ -101,7 +101,7 @@ impl Lss {
             booted(session, id)?;
         }
         if let Some((_, false)) = done.new_id() {
-            note("in force after `nodectl nmt reset-comm`");
+            note("in force after `nodectl nmt reset-comm --node all`");
         }
         done.print(session)
     }
@@ -146,7 +146,8 @@ impl Lss {
                 if store {
                     master.store()?;
                 }
-                format!("bit rate {kbit} kbit/s{}", kept(store))
+                let rate = if kbit == 0 { "automatic detection".to_owned() } else { format!("{kbit} kbit/s") };
+                format!("bit rate: {rate}{}", kept(store))
             }
             Command::Store => {
                 master.store()?;

@@ -24,7 +24,7 @@ pub(super) fn configured(session: &mut Session) -> Result<BTreeMap<NodeId, Prese
 
 /// The identity of the only node on the bus.
 pub(super) fn only(session: &mut Session) -> Result<Identity, Failure> {
-    note("no --select: looking who is on the bus");
+    note("no --select: the only node on the bus is searched");
     let configured: Vec<NodeId> = configured(session)?.into_keys().collect();
     let unconfigured = unconfigured(session)?;
     match (&configured[..], &unconfigured[..]) {
@@ -38,7 +38,7 @@ pub(super) fn only(session: &mut Session) -> Result<Identity, Failure> {
                 .map(|identity| format!("a node without node-ID ({})", describe(identity)));
             let names: Vec<String> = nodes.chain(others).collect();
             let message =
-                format!("more than one node would take it: {}; name one with --select", names.join(", "));
+                format!("more than one node is on the bus: {}; name one with --select", names.join(", "));
             Err(Failure::Usage(message))
         }
     }

@@ -3,7 +3,7 @@
 export const NODE = {
   0x2000: "What the node is: 0 pressure, 1 encoder, 2 both, 3 lift. In force after the next reset.",
   0x2001: "Events that were lost and healed, since power-on.",
-  0x2002: "The trial of a new program: whether it may still be taken back, the command that ends it, and its times in s (0: none).",
+  0x2002: "The trial of a new program: whether it may still be rolled back, the command that ends it, and its times in s (0: none).",
   0x2003: "Who may change the program: whether the node asks for it (0: it does not, 1: closed, 2: open until the next start), the challenge of this start, and where the response goes.",
   0x2004: "The board, as a code that an update must name; the programs in the flash; erases of the program memory so far, and clears that the bootloader accepts now.",
   0x2005: "Values of the board for its bring-up: write the number of a value, then read the value.",
