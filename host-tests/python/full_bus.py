@@ -132,7 +132,11 @@ class Client:
 
 def serve(bus: FullBus) -> tuple[subprocess.Popen, str]:
     """The server on the bus, with its address."""
-    address = f"socketcand://127.0.0.1:{bus.port}/vcan0"
+    return serve_address(f"socketcand://127.0.0.1:{bus.port}/vcan0")
+
+
+def serve_address(address: str) -> tuple[subprocess.Popen, str]:
+    """The server on the bus with this address, with the address of its page."""
     command = [os.environ["NODECTL_COMMAND"], "--json", "serve", address, "--page", "127.0.0.1:0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     return process, json.loads(process.stdout.readline())["page"]

@@ -90,7 +90,7 @@ def take_page(page: Page) -> None:
     page.open_object("6132h:1")
     page.fill("Search", "pressure 61")
     page.press("Read all values")
-    page.says("#view-dictionary > div > .outcome", "objects read")
+    page.says("#view-dictionary .counts", "objects read")
     shoot(page, "dictionary")
     page.view("commissioning")
     page.says("#view-commissioning [data-pdo='TPDO 1']", "6130h:1")
