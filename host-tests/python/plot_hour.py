@@ -21,7 +21,9 @@ RATE = 1000
 #: The values of the sine that the node sends: its period in seconds.
 PERIOD = 7.0
 #: Seconds of the bus in a parcel, and how far the bus may be ahead of the page: a queue of the server has 4096 samples.
-PARCEL, AHEAD = 0.25, 2.0
+PARCEL, AHEAD = 0.25, 3.0
+#: The time stamp of the first frame, at which the time of the page begins.
+FIRST = 1.0
 
 #: The signal that is plotted, and one sample that is greater than all others, early in the run.
 SIGNAL, PEAK = f"{NODE}:6130:1", 10.0
@@ -31,7 +33,7 @@ PEAK_AT = 20.0
 class FastBus(FullBus):
     """A full bus with a clock of its own."""
 
-    now = 1.0
+    now = FIRST
 
     def frames(self, frames: list[tuple[int, bytes]]) -> None:
         self.stamped([(self.now, *frame) for frame in frames])
@@ -106,24 +108,23 @@ def private(pid: int) -> float:
 RECORDED = """const series = window.canopen.recorder.of(arguments[0]), { from } = window.canopen.time;
     const drawn = [...document.querySelectorAll("#view-live canvas")].flatMap((canvas) => Chart.getChart(canvas).data.datasets[0].data);
     return { samples: series.t.length, first: series.t[0], newest: series.t.at(-1), greatest: Math.max(...drawn.map(({ y }) => y)),
-      lost: window.canopen.recorder.lost + window.canopen.bus.status.lost.live, listed: window.canopen.bus.nodes.size }"""
+      lost: Math.max(window.canopen.recorder.lost, window.canopen.bus.status.lost.live), listed: window.canopen.bus.nodes.size }"""
 
 
 def measure(page: Page, bus: FastBus, seconds: float) -> Figures:
     page.driver.execute_cdp_cmd("Performance.enable", {})
-    begin, heaps, start, until = time.monotonic(), [0.0], bus.now, bus.now + seconds
+    begin, heaps, until = time.monotonic(), [0.0], bus.now + seconds
     page.view("live")
     page.choose("Node", str(NODE))
     page.choose("Time", "3600")
     page.until(lambda: page.script("return document.querySelectorAll('#view-live canvas').length"), "plot the node")
-    first = bus.now - 1.0
     while bus.now < until:
         bus.parcel()
-        while bus.now - start - page.script("return window.canopen.recorder.t") > AHEAD + first:
+        while bus.now - FIRST - page.script("return window.canopen.recorder.t") > AHEAD:
             time.sleep(POLL / 10)
         if round(bus.now / PARCEL) % 40 == 0:
             heaps.append(heap(page))
-    page.until(lambda: page.script(RECORDED, SIGNAL)["newest"] >= until - 1 - 2 / RATE, "plot the last sample")
+    page.until(lambda: page.script(RECORDED, SIGNAL)["newest"] >= until - FIRST - 2 / RATE, "plot the last sample")
     wall, largest = time.monotonic() - begin, renderer(page)
     time.sleep(4 * POLL)
     recorded = page.script(RECORDED, SIGNAL)

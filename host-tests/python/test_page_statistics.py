@@ -74,7 +74,7 @@ def test_the_peak_stays_after_a_burst_until_it_is_reset(page: Page, adapter: Slc
     page.until(lambda: "%" in shown(page, "Load"), "show the load")
     assert "at 250 kbit/s" in shown(page, "Load")
     adapter.burst.set()
-    peak = "Peak load in 0.1 s"
+    peak = "Peak (0.1 s)"
     percent = lambda name: float(shown(page, name).split("\n")[1].split(" ")[0])
     page.until(lambda: percent(peak) > 18, "show the peak of the burst")
     page.until(lambda: percent("Load") < 2, "show the load after the burst")

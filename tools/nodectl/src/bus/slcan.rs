@@ -55,9 +55,7 @@ impl Splitter {
                         self.controller.on_flags(flags);
                     }
                     // A time stamp may follow the frame.
-                    frames.extend(
-                        slcan::frame::<Frame>(&line).map(|(frame, _)| frame),
-                    );
+                    frames.extend(slcan::frame::<Frame>(&line).map(|(frame, _)| frame));
                 }
                 // Some adapters acknowledge a sent frame without a carriage return.
                 b'z' | b'Z' if self.line.is_empty() => (),
@@ -70,7 +68,9 @@ impl Splitter {
 
 /// The status flags in the answer to the command `F`: `F00`.
 fn flags(line: &str) -> Option<u8> {
-    line.strip_prefix('F').filter(|digits| digits.len() == 2).and_then(|digits| u8::from_str_radix(digits, 16).ok())
+    line.strip_prefix('F')
+        .filter(|digits| digits.len() == 2)
+        .and_then(|digits| u8::from_str_radix(digits, 16).ok())
 }
 
 /// An adapter that is on the bus.

@@ -31,7 +31,7 @@ export class SignalTable {
     const box = el("input", { type: "checkbox", "aria-label": `Plot ${signal.label}`, prop: { checked: owner.shown.get(signal.signal) ?? false, disabled: isText } });
     box.addEventListener("change", () => owner.plot(signal.signal, box.checked));
     const [value, age, status] = [el("td", { class: "number" }), el("td", { class: "number age" }), el("td")];
-    const remove = signal.isAdded && button("Remove", () => owner.remove(signal.signal), { class: "plain", "aria-label": `Remove ${signal.label}` });
+    const remove = signal.isAdded && button("×", () => owner.remove(signal.signal), { class: "plain remove", "aria-label": `Remove ${signal.label}` });
     const source = el("td", {}, signal.tpdo == null ? "SDO" : `TPDO ${signal.tpdo}`, remove ? " " : null, remove);
     const name = el("th", { scope: "row" }, legend(position), signal.label);
     const row = el("tr", { data: { signal: signal.signal } }, el("td", {}, box), el("td", {}, address(signal.index, signal.sub)), name, value, age, status, source);

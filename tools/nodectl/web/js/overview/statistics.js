@@ -10,7 +10,7 @@ const [WIDTH, HEIGHT] = [KEPT, 30];
 /** What each tile shows: a value, a line below it, and the kind of the value (good, warn, bad). */
 const TILES = {
   "Load": ({ load, bit_rate }) => [percent(load), bit_rate == null ? "bit rate unknown" : `at ${bit_rate} kbit/s`, kindOf(load)],
-  "Peak load in 0.1 s": (_, { peak, since }) => [percent(peak), `since ${seconds(since, 0)}`, kindOf(peak)],
+  "Peak (0.1 s)": (_, { peak, since }) => [percent(peak), `since ${seconds(since, 0)}`, kindOf(peak)],
   "Frames": ({ frames, total }) => [`${frames}/s`, `${total} in all`],
   "Error frames": ({ controller: { error_frames: count } }) => [count == null ? "-" : String(count), count == null ? "not reported" : "since the bus was opened", count ? "bad" : count === 0 ? "good" : "none"],
   "Controller": ({ controller }) => [controller.state ?? "-", counters(controller), { "error-active": "good", "error-warning": "warn" }[controller.state] ?? (controller.state ? "bad" : "none")],
@@ -24,7 +24,7 @@ export function statistics(bus) {
   const show = () => bus.status && Object.entries(TILES).forEach(([name, of]) => fill(tiles[name], of(known(bus.status), history)));
   const reset = button("Reset", () => (forget(history, bus.status), show()), { class: "plain", "aria-label": "Reset the peak load" });
   tiles.Load.element.append(drawing);
-  tiles["Peak load in 0.1 s"].element.append(reset);
+  tiles["Peak (0.1 s)"].element.append(reset);
   bus.on("status", (status) => {
     take(history, status);
     set(curve, "points", line(history.loads));

@@ -37,10 +37,12 @@ export class Series {
     const end = this.t.length - KEPT;
     const chosen = [];
     for (let at = this.old; at < end; at += REDUCED) chosen.push(...this.#extremes(at, Math.min(end, at + REDUCED)));
-    const [t, v] = [chosen.map((at) => this.t[at]), chosen.map((at) => this.v[at])];
     const forgotten = Math.max(0, this.old + chosen.length - OLD);
-    this.t = [...this.t.slice(forgotten, this.old), ...t, ...this.t.slice(end)];
-    this.v = [...this.v.slice(forgotten, this.old), ...v, ...this.v.slice(end)];
+    for (const array of [this.t, this.v]) {
+      // In place: copies of arrays of this length would be most of the memory of the page.
+      array.splice(this.old, end - this.old, ...chosen.map((at) => array[at]));
+      array.splice(0, forgotten);
+    }
     this.old += chosen.length - forgotten;
   }
 

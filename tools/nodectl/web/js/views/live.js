@@ -28,7 +28,7 @@ class Live {
     this.table = new SignalTable(this);
     this.adder = new Adder(bus, (signal) => this.#add(signal));
     this.plots = el("div", { class: "plots" });
-    this.faults = el("ul", { class: "faults", "aria-label": "Faults" });
+    this.faults = el("ul", { class: "faults", "aria-label": "Events" });
     this.empty = el("p", { class: "hint" });
     this.boards = new Boards(bus, ({ node }) => node === bus.chosen);
     this.content = this.#layout();
@@ -48,7 +48,7 @@ class Live {
   }
 
   #layout() {
-    const side = el("div", { class: "side" }, el("div", { class: "wide" }, this.table.element), this.adder.element, el("h3", {}, "Faults"), this.faults, this.boards.element);
+    const side = el("div", { class: "side" }, el("div", { class: "wide" }, this.table.element), this.adder.element, el("h3", {}, "Events"), this.faults, this.boards.element);
     return el("div", {}, el("div", { class: "bar" }, nodeChoice(this.bus), ...this.#tools()), this.empty, el("div", { class: "live" }, this.plots, side));
   }
 
@@ -77,7 +77,7 @@ class Live {
     bus.connection.on("mapping", ({ node }) => this.#nodes().has(node) && this.#ask());
     recorder.on("samples", () => (this.isStale = true));
     time.addEventListener("change", () => this.#showTime());
-    onTheme(() => this.#makeCharts());
+    onTheme(() => this.#showSignals());
   }
 
   /** Follows the content of the chosen node's TPDOs, also while another view is shown, so that no samples are missing. */
