@@ -137,7 +137,7 @@ class Page:
     def open_object(self, address: str) -> str:
         """Finds an object in the dictionary and opens its details. Returns the selector of the details."""
         self.view("dictionary")
-        self.until(lambda: self.script("return document.querySelectorAll('.objects tbody tr.object').length > 5"), "list the objects")
+        self.until(lambda: self.script("return document.querySelectorAll('.objects tbody tr.object').length > 0"), "list the objects")
         self.fill("Search", address)
         row = f"tr[data-object='{address}']"
         if self.find(f"{row} button.plain").get_attribute("aria-expanded") == "false":
