@@ -17,6 +17,13 @@ from simulator import PATIENCE, Simulator
 #: The selector of the view on display.
 SHOWN = "main > section:not([hidden])"
 
+#: Texts and tables that are cut off at the right, or can only be read by scrolling to the right.
+CUT = """return [...document.querySelectorAll("main section:not([hidden]) *")].filter((element) => {
+  const { right, width } = element.getBoundingClientRect();
+  const isScrolled = ["auto", "scroll"].includes(getComputedStyle(element).overflowX) && element.scrollWidth > element.clientWidth + 1;
+  return width > 0 && !element.closest(".unseen, .tile svg, option, thead") && (right > innerWidth + 1 || isScrolled);
+}).map((element) => `${element.tagName}.${element.className}: ${element.innerText?.slice(0, 40)}`)"""
+
 #: Seconds between two checks of the page.
 POLL = 0.1
 
@@ -130,7 +137,7 @@ class Page:
     def open_object(self, address: str) -> str:
         """Finds an object in the dictionary and opens its details. Returns the selector of the details."""
         self.view("dictionary")
-        self.until(lambda: self.script("return document.querySelectorAll('.objects tbody tr').length > 50"), "list the objects")
+        self.until(lambda: self.script("return document.querySelectorAll('.objects tbody tr.object').length > 0"), "list the objects")
         self.fill("Search", address)
         row = f"tr[data-object='{address}']"
         if self.find(f"{row} button.plain").get_attribute("aria-expanded") == "false":

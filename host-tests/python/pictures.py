@@ -60,17 +60,24 @@ def bus_time(page: Page) -> float:
     return page.script("return window.canopen.recorder.t")
 
 
+CURSOR = "window.canopen.time.point(2 / 3)"
+
+
 def take_page(page: Page) -> None:
     page.view("overview")
-    for node in (1, 2, 16):
+    for node in (1, 2, 3, 16):
         page.says(f"tr[data-node='{node}'] td[data-label=Personality]", "")
     page.press("Start all")
     page.says("tr[data-node='1'] td[data-label=State]", "operational")
-    page.write(1, 0x1800, 5, 10)
+    for node in (1, 3):
+        page.write(node, 0x1800, 5, 10)
     # A fault of the device leaves the node in Operational.
     page.write(1, 0x1029, 2, 1)
     begin = bus_time(page)
     page.view("live")
+    page.choose("Series of node", "3")
+    page.choose("Object", "3:6130:1")
+    page.press("Add")
     page.until(lambda: bus_time(page) > begin + SECONDS * 0.6, "measure")
     fault = page.field("open sensor")
     fault.click()
@@ -78,6 +85,8 @@ def take_page(page: Page) -> None:
     page.until(lambda: bus_time(page) > begin + SECONDS * 0.7, "measure")
     fault.click()
     page.until(lambda: bus_time(page) > begin + SECONDS * 1.1, "measure")
+    # The cursor, at two thirds of the time.
+    page.script(CURSOR)
     shoot(page, "live")
     shoot_dark(page, "live-dark")
     page.view("overview")
@@ -90,7 +99,7 @@ def take_page(page: Page) -> None:
     page.open_object("6132h:1")
     page.fill("Search", "pressure 61")
     page.press("Read all values")
-    page.says("#view-dictionary > div > .outcome", "objects read")
+    page.says("#view-dictionary .counts", "objects read")
     shoot(page, "dictionary")
     page.view("commissioning")
     page.says("#view-commissioning [data-pdo='TPDO 1']", "6130h:1")
@@ -152,8 +161,8 @@ def take_terminal(driver) -> None:
 
 
 def main() -> None:
-    flags = ["--bitrate", "250", "--control", "127.0.0.1:0", "--pressure", "sine:250000,100000,0.5", "--shaft", "2=rpm:30", "--shaft", "16=sine:10,5,0.05"]
-    for node in ("1:pressure", "2:encoder", "16:lift"):
+    flags = ["--bitrate", "250", "--control", "127.0.0.1:0", "--pressure", "sine:250000,100000,0.5", "--pressure", "3=sine:300000,50000,0.2", "--shaft", "2=rpm:30", "--shaft", "16=sine:10,5,0.05"]
+    for node in ("1:pressure", "2:encoder", "3:pressure", "16:lift"):
         flags += ["--node", node]
     simulator = Simulator(*flags, speed="real")
     server = Server(simulator)

@@ -2,6 +2,7 @@
 
 mod address;
 pub(crate) mod clock;
+mod controller;
 mod none;
 mod simulated;
 mod slcan;
@@ -16,6 +17,7 @@ use canopen::{Frame, Instant};
 use thiserror::Error;
 
 pub use address::{Address, AddressError};
+pub use controller::{Controller, State};
 pub use none::NoBus;
 pub use simulated::{Simulated, Station};
 
@@ -39,6 +41,11 @@ pub trait Bus {
     /// # Errors
     /// [`BusError::Lost`].
     fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError>;
+
+    /// What the adapter has reported about its controller. A call may request a new report for the next call.
+    fn controller(&mut self) -> Controller {
+        Controller::default()
+    }
 }
 
 /// A frame from the bus.

@@ -10,7 +10,7 @@ use canopen::{Duration, Frame, Instant};
 use wire::slcan::{self, BIT_RATES};
 
 use super::stream::Stream;
-use super::{Bus, BusError, Received, clock};
+use super::{Bus, BusError, Controller, Received, clock};
 
 /// How long to wait for the greeting of a peer that is no adapter.
 const GREETING: Duration = Duration::from_millis(200);
@@ -37,28 +37,40 @@ fn opening(bit_rate: u16) -> io::Result<String> {
     Ok(format!("\r\rC\rS{index}\rO\r"))
 }
 
-/// Cuts a stream of bytes into frames. What is no base frame is passed over.
+/// Cuts a stream of bytes into frames and status flags. Other lines are ignored.
 #[derive(Default)]
-struct Splitter(Vec<u8>);
+struct Splitter {
+    line: Vec<u8>,
+    controller: Controller,
+}
 
 impl Splitter {
     fn push(&mut self, bytes: &[u8], frames: &mut VecDeque<Frame>) {
         for &byte in bytes {
             match byte {
                 b'\r' | b'\x07' => {
-                    let line = std::mem::take(&mut self.0);
+                    let line = std::mem::take(&mut self.line);
+                    let line = String::from_utf8_lossy(&line);
+                    if let Some(flags) = flags(&line) {
+                        self.controller.on_flags(flags);
+                    }
                     // A time stamp may follow the frame.
-                    frames.extend(
-                        slcan::frame::<Frame>(&String::from_utf8_lossy(&line)).map(|(frame, _)| frame),
-                    );
+                    frames.extend(slcan::frame::<Frame>(&line).map(|(frame, _)| frame));
                 }
                 // Some adapters acknowledge a sent frame without a carriage return.
-                b'z' | b'Z' if self.0.is_empty() => (),
-                _ if self.0.len() < LONGEST => self.0.push(byte),
+                b'z' | b'Z' if self.line.is_empty() => (),
+                _ if self.line.len() < LONGEST => self.line.push(byte),
                 _ => (),
             }
         }
     }
+}
+
+/// The status flags in the answer to the command `F`: `F00`.
+fn flags(line: &str) -> Option<u8> {
+    line.strip_prefix('F')
+        .filter(|digits| digits.len() == 2)
+        .and_then(|digits| u8::from_str_radix(digits, 16).ok())
 }
 
 /// An adapter that is on the bus.
@@ -130,6 +142,13 @@ impl Bus for Slcan {
             }
         }
     }
+
+    /// The answer to the command `F` comes between the frames. Reading the flags clears them in the adapter.
+    fn controller(&mut self) -> Controller {
+        // A lost adapter is reported by the next read.
+        let _ = self.stream.write("F\r");
+        self.splitter.controller
+    }
 }
 
 #[cfg(test)]
@@ -162,6 +181,15 @@ mod tests {
         }
         let noise = "y".repeat(1000) + "\rt1230\r";
         assert_eq!(frames(&noise), [Frame::new(0x123, &[]).unwrap()]);
+    }
+
+    #[test]
+    fn status_flags_between_frames() {
+        let (mut splitter, mut out) = (Splitter::default(), VecDeque::new());
+        splitter.push(b"t7010\rF8", &mut out);
+        assert_eq!(splitter.controller, Controller::default());
+        splitter.push(b"4\rt7010\rF\rF1G\r", &mut out);
+        assert_eq!((out.len(), splitter.controller.error_frames), (2, Some(1)));
     }
 
     #[test]

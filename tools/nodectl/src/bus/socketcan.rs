@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use canopen::embedded_can::{from_driver, to_driver};
 use canopen::{Frame, Instant};
-use socketcan::{CanFrame, CanSocket, Socket};
+use socketcan::{CanErrorFrame, CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions};
 
 use super::stream::is_time_out;
-use super::{Bus, BusError, Received, clock};
+use super::{Bus, BusError, Controller, Received, clock};
 
 /// The shortest time-out of a read; 0 would mean no time-out.
 const SHORTEST: Duration = Duration::from_millis(1);
@@ -22,11 +22,15 @@ const TRIES: usize = 2000;
 /// An open interface.
 pub(super) struct SocketCan {
     socket: CanSocket,
+    controller: Controller,
 }
 
 impl SocketCan {
     pub(super) fn open(interface: &str) -> io::Result<SocketCan> {
-        Ok(SocketCan { socket: CanSocket::open(interface)? })
+        let socket = CanSocket::open(interface)?;
+        // Without error frames the interface has no statistics, and works.
+        let error_frames = socket.set_error_filter_accept_all().ok().map(|()| 0);
+        Ok(SocketCan { socket, controller: Controller { error_frames, ..Controller::default() } })
     }
 
     /// The next frame within this time. With a time of 0, a frame that is there already.
@@ -61,6 +65,7 @@ impl Bus for SocketCan {
     fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
         loop {
             match self.read_within(clock::left(until)) {
+                Ok(CanFrame::Error(error)) => on_error(&mut self.controller, &error),
                 Ok(frame) => {
                     if let Some(frame) = from_host(&frame) {
                         return Ok(Some(Received { frame, at: self.now() }));
@@ -74,6 +79,14 @@ impl Bus for SocketCan {
             }
         }
     }
+
+    fn controller(&mut self) -> Controller {
+        self.controller
+    }
+}
+
+fn on_error(controller: &mut Controller, error: &CanErrorFrame) {
+    controller.on_error_frame(error.error_bits(), error.data());
 }
 
 fn is_full(error: &io::Error) -> bool {
@@ -88,7 +101,7 @@ fn from_host(frame: &CanFrame) -> Option<Frame> {
 
 #[cfg(test)]
 mod tests {
-    use socketcan::{EmbeddedFrame, ExtendedId};
+    use socketcan::ExtendedId;
 
     use super::*;
 
@@ -100,5 +113,20 @@ mod tests {
         }
         let extended = CanFrame::new(ExtendedId::new(0x181).unwrap(), &[1]).unwrap();
         assert_eq!(from_host(&extended), None);
+    }
+
+    #[test]
+    fn an_error_frame_is_counted_with_its_error_counters() {
+        let mut controller = Controller::default();
+        // A bus error with counters: classes 80h and 200h.
+        let error = CanErrorFrame::new_error(0x280, &[0, 0, 0, 0, 0, 0, 8, 1]).unwrap();
+        on_error(&mut controller, &error);
+        let expected = Controller {
+            error_frames: Some(1),
+            transmit_errors: Some(8),
+            receive_errors: Some(1),
+            ..Controller::default()
+        };
+        assert_eq!(controller, expected);
     }
 }

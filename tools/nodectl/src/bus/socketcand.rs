@@ -10,7 +10,7 @@ use canopen::{Duration, Frame, Instant};
 use wire::socketcand;
 
 use super::stream::Stream;
-use super::{Bus, BusError, Received, clock};
+use super::{Bus, BusError, Controller, Received, clock};
 
 /// How long the daemon may take to answer.
 const ANSWER: Duration = Duration::from_millis(3000);
@@ -23,8 +23,10 @@ enum Message {
     Hi,
     Ok,
     Error(String),
+    /// An error frame, with its class.
+    ErrorFrame(u32),
     Frame(Received),
-    /// Messages that this client does not use: error frames, 29-bit identifiers, statistics.
+    /// Messages that this client does not use: 29-bit identifiers, statistics.
     Other,
 }
 
@@ -34,6 +36,9 @@ fn parse(text: &str) -> Message {
     match words.as_slice() {
         ["hi"] => Message::Hi,
         ["ok"] => Message::Ok,
+        ["error", class, at] if clock::parse(at).is_some() => {
+            u32::from_str_radix(class, 16).map_or(Message::Other, Message::ErrorFrame)
+        }
         ["error", reason @ ..] => Message::Error(reason.join(" ")),
         words => match socketcand::reported(words) {
             Some((frame, micros)) => Message::Frame(Received { frame, at: Instant(micros) }),
@@ -65,13 +70,19 @@ pub(super) struct Socketcand {
     stream: Stream,
     splitter: Splitter,
     messages: VecDeque<Message>,
+    controller: Controller,
 }
 
 impl Socketcand {
     /// Connects to a daemon and opens one of its buses.
     pub(super) fn connect(host: impl ToSocketAddrs, bus: &str) -> io::Result<Socketcand> {
         let stream = Stream::connect(host)?;
-        let mut this = Socketcand { stream, splitter: Splitter::default(), messages: VecDeque::new() };
+        let mut this = Socketcand {
+            stream,
+            splitter: Splitter::default(),
+            messages: VecDeque::new(),
+            controller: Controller::default(),
+        };
         this.expect(&Message::Hi)?;
         for command in [format!("< open {bus} >"), "< rawmode >".to_owned()] {
             this.stream.write(&command).map_err(io::Error::other)?;
@@ -120,10 +131,15 @@ impl Bus for Socketcand {
             match message {
                 Message::Frame(received) => return Ok(Some(received)),
                 Message::Error(reason) => return Err(BusError::Lost(io::Error::other(reason))),
+                Message::ErrorFrame(class) => self.controller.on_error_frame(class, &[]),
                 _ => (),
             }
         }
         Ok(None)
+    }
+
+    fn controller(&mut self) -> Controller {
+        self.controller
     }
 }
 

@@ -30,7 +30,7 @@ export function showStatus(bus) {
 
 function addFact(name) {
   const value = el("dd", {}, "-");
-  document.getElementById("bus-status").append(el("div", {}, el("dt", {}, name), value));
+  document.getElementById("bus-status").append(el("div", { data: { fact: name } }, el("dt", {}, name), value));
   return value;
 }
 

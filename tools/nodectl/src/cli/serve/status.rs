@@ -4,12 +4,23 @@ use canopen::Frame;
 
 use crate::cli::load;
 
+/// The time over which the peak of the load is measured, in seconds.
+const WINDOW: f64 = 0.1;
+
 /// Frames and bits since the last rate, and frames in total.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Count {
     frames: u32,
     bits: u64,
     pub(super) total: u64,
+}
+
+/// The most bits of a tenth of a second.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Peak {
+    begin: f64,
+    bits: u64,
+    most: u64,
 }
 
 /// The rates over a time.
@@ -24,7 +35,7 @@ pub(super) struct Rate {
 impl Count {
     pub(super) fn add(&mut self, frame: &Frame) {
         self.frames = self.frames.saturating_add(1);
-        self.bits += load::bits(if frame.is_remote() { 0 } else { frame.len() });
+        self.bits += bits(frame);
         self.total += 1;
     }
 
@@ -37,6 +48,28 @@ impl Count {
         }
         Rate { frames: (f64::from(frames) / seconds).round(), bits: bits as f64 / seconds }
     }
+}
+
+impl Peak {
+    /// Takes a frame with its time on the bus.
+    pub(super) fn add(&mut self, frame: &Frame, t: f64) {
+        if !(0.0..WINDOW).contains(&(t - self.begin)) {
+            (self.begin, self.bits) = (t, 0);
+        }
+        self.bits += bits(frame);
+        self.most = self.most.max(self.bits);
+    }
+
+    /// The greatest load since the last call.
+    pub(super) fn take(&mut self, kbit: Option<u16>) -> Option<f64> {
+        let most = std::mem::take(&mut self.most);
+        #[allow(clippy::cast_precision_loss)]
+        Rate { frames: 0.0, bits: most as f64 / WINDOW }.load(kbit)
+    }
+}
+
+fn bits(frame: &Frame) -> u64 {
+    load::bits(if frame.is_remote() { 0 } else { frame.len() })
 }
 
 impl Rate {
@@ -64,5 +97,18 @@ mod tests {
         (0..854).for_each(|_| count.add(&frame));
         assert_eq!(count.rate(1.0).load(Some(1000)), Some(0.0999));
         assert_eq!(count.rate(1.0), Rate::default());
+    }
+
+    #[test]
+    fn the_peak_is_the_load_of_the_busiest_tenth_of_a_second() {
+        let mut peak = Peak::default();
+        let frame = Frame::new(0x181, &[0x55; 8]).unwrap();
+        // 117 bits: 100 frames in 0.1 s at 250 kbit/s are 46.8 %, and one frame in the next 0.9 s.
+        (0..100_u8).for_each(|at| peak.add(&frame, 1.0 + f64::from(at) / 1e6));
+        peak.add(&frame, 1.9);
+        assert_eq!(peak.take(Some(250)), Some(0.468));
+        assert_eq!(peak.take(Some(250)), Some(0.0));
+        peak.add(&frame, 2.0);
+        assert_eq!(peak.take(None), None, "the bit rate is unknown");
     }
 }

@@ -4,6 +4,7 @@ import { button, el, field, select, setChoices, text } from "../dom.js";
 import { address, hex } from "../format.js";
 import { outcome } from "../outcome.js";
 
+const HEAD = ["PDO", "COB-ID", "Type", "Inhibit, 100 us", "Event, ms", "Objects"];
 const STEPS = ["PDO off (bit 31 of its COB-ID)", "number of objects 0", "the objects", "their number", "PDO on"];
 const SLOTS = 8;
 
@@ -40,8 +41,8 @@ export class Mapping {
     this.type = el("input", { type: "number", min: 0, max: 255 });
     this.event = el("input", { type: "number", min: 0, max: 65535 });
     this.inhibit = el("input", { type: "number", min: 0, max: 65535 });
-    const head = ["PDO", "COB-ID", "Type", "Inhibit, 100 us", "Event, ms", "Objects"].map((name) => el("th", { scope: "col" }, name));
-    const table = el("table", {}, el("caption", { class: "unseen" }, "PDOs"), el("thead", {}, el("tr", {}, head)), this.list);
+    const head = HEAD.map((name) => el("th", { scope: "col" }, name));
+    const table = el("table", { class: "pdos cards" }, el("caption", { class: "unseen" }, "PDOs"), el("thead", {}, el("tr", {}, head)), this.list);
     return el("section", { class: "box", "aria-labelledby": "mapping-title" }, el("h3", { id: "mapping-title" }, "PDO mapping"),
       el("div", { class: "wide" }, table),
       el("div", { class: "bar" }, field("PDO", this.choice), field("Transmission type", this.type), field("Event timer, ms", this.event), field("Inhibit time, 100 us", this.inhibit)),
@@ -53,7 +54,7 @@ export class Mapping {
     this.list.replaceChildren(...this.pdos.map((pdo) => {
       const objects = pdo.objects.map(({ index, sub, name }) => `${address(index, sub)} ${name ?? ""}`).join(", ");
       const cells = [`${hex(pdo.cob_id & 0x7ff, 3)}${pdo.on ? "" : " off"}`, pdo.transmission, pdo.inhibit ?? "-", pdo.event ?? "-", objects || "-"];
-      return el("tr", { data: { pdo: title(pdo), ...(pdo.on ? {} : { off: "yes" }) } }, el("th", { scope: "row" }, title(pdo)), cells.map((cell) => el("td", {}, String(cell))));
+      return el("tr", { data: { pdo: title(pdo), ...(pdo.on ? {} : { off: "yes" }) } }, el("th", { scope: "row" }, title(pdo)), cells.map((cell, at) => el("td", { data: { label: HEAD[at + 1] } }, String(cell))));
     }));
   }
 

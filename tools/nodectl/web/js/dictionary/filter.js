@@ -1,6 +1,7 @@
 // The selection of the objects that are shown.
 
 import { address } from "../format.js";
+import { AREAS } from "./areas.js";
 import { isWritable } from "./check.js";
 
 export const SETS = [
@@ -17,15 +18,6 @@ export const SETS = [
   ["rpdo", "those that an RPDO can write"],
 ];
 
-/** The first and the last index of each group. */
-const GROUPS = {
-  communication: [0x1000, 0x13ff],
-  pdo: [0x1400, 0x1bff],
-  network: [0x1c00, 0x1fff],
-  manufacturer: [0x2000, 0x5fff],
-  profile: [0x6000, 0xffff],
-};
-
 export const keyOf = ({ index, sub }) => `${index}:${sub}`;
 
 /** Whether an object has every word of the search in its name or its address. */
@@ -36,8 +28,8 @@ export function matches(entry, search) {
 
 /** Whether an object belongs to a set. */
 export function isIn(entry, set, { favourites, differing }) {
-  const group = GROUPS[set];
-  if (group) return entry.index >= group[0] && entry.index <= group[1];
+  const area = AREAS.find(([name]) => name === set);
+  if (area) return entry.index >= area[2] && entry.index <= area[3];
   switch (set) {
     case "favourites": return favourites.has(keyOf(entry));
     case "writable": return isWritable(entry);

@@ -8,20 +8,28 @@ import { keyOf } from "./filter.js";
 import { help } from "./help.js";
 
 export class Row {
-  /** `owner`: the view, with `read`, `write` and `favourites`. */
+  kind = "object";
+
+  /** `owner`: the view, with `read`, `write`, `arrange` and `favourites`. */
   constructor(entry, owner) {
-    Object.assign(this, { entry, owner, key: keyOf(entry), details: null });
-    this.value = el("td", { class: "number", data: { label: "Value" } });
-    this.unit = el("td", { data: { label: "Unit" } }, knownUnit(entry));
-    this.opener = el("button", { type: "button", class: "plain", "aria-expanded": "false", on: { click: () => this.toggle() } }, address(entry.index, entry.sub));
-    this.element = el("tr", { data: { object: address(entry.index, entry.sub) } }, el("td", {}, this.#star()), el("th", { scope: "row" }, this.opener), ...this.#cells());
+    Object.assign(this, { entry, owner, key: keyOf(entry), details: null, made: null });
+  }
+
+  /** The line of the table. It is made when it comes into view for the first time. */
+  get element() {
+    this.made ??= this.#make();
+    return this.made;
   }
 
   show(value) {
     this.newest = value;
-    text(this.value, value.error ? "-" : shown(value));
-    if (value.unit) text(this.unit, value.unit);
-    set(this.value, "title", value.error ?? (value.raw ? `bytes ${value.raw}` : null));
+    if (this.made) this.#fill();
+  }
+
+  /** Drops the value: the node may have another one now. */
+  forget() {
+    this.newest = undefined;
+    if (this.made) this.#fill();
   }
 
   toggle() {
@@ -29,25 +37,40 @@ export class Row {
     const id = newId("details");
     set(this.opener, "aria-expanded", "true");
     set(this.opener, "aria-controls", id);
-    this.details = el("tr", { id, class: "details" }, el("td", { colspan: 9 }, this.#help(), this.#editor()));
-    this.element.after(this.details);
+    const element = el("tr", { id, class: "details" }, el("td", { colspan: 9 }, el("div", {}, this.#help(), this.#editor())));
+    this.details = { kind: "details", element, made: element };
+    this.owner.arrange();
     if (isReadable(this.entry)) this.#read();
   }
 
   close() {
     set(this.opener, "aria-expanded", "false");
-    this.details?.remove();
     this.details = null;
+    this.owner.arrange();
   }
 
-  remove() {
-    this.close();
-    this.element.remove();
+  #make() {
+    const { entry } = this;
+    this.value = el("td", { class: "number", data: { label: "Value" } });
+    this.unit = el("td", { data: { label: "Unit" } }, knownUnit(entry));
+    this.opener = el("button", { type: "button", class: "plain", "aria-expanded": "false", on: { click: () => this.toggle() } }, address(entry.index, entry.sub));
+    const element = el("tr", { class: "object", data: { object: address(entry.index, entry.sub) } }, el("td", {}, this.#star()), el("th", { scope: "row" }, this.opener), ...this.#cells());
+    this.#fill();
+    return element;
+  }
+
+  #fill() {
+    const { newest: value, entry } = this;
+    set(this.value, "class", value ? "number" : "number waiting");
+    if (!value) return text(this.value, isReadable(entry) ? "…" : "write only");
+    text(this.value, value.error ? "-" : shown(value));
+    if (value.unit) text(this.unit, value.unit);
+    return set(this.value, "title", value.error ?? `${shown(value)}${value.raw ? `, bytes ${value.raw}` : ""}`);
   }
 
   #cells() {
     const { path, type, access } = this.entry;
-    const cell = (label, content) => el("td", { data: { label } }, content);
+    const cell = (label, content) => el("td", { title: content, data: { label } }, content);
     return [cell("Name", path), this.value, this.unit, cell("Type", type), cell("Access", access), cell("Limits", this.#limits()), cell("Default", this.#default())];
   }
 

@@ -8,6 +8,9 @@ import { drawCursor, drawMarks } from "./marks.js";
 import { points } from "./series.js";
 import { colour, line } from "./theme.js";
 
+/** The columns of the values below a chart. */
+const HEAD = ["Cursor", "Min", "Max", "Max - min"];
+
 export class UnitChart {
   /** `signals`: `{key, name, position, status}`; the colour depends on the position. */
   constructor(unit, signals, { recorder, time, faults }) {
@@ -15,8 +18,7 @@ export class UnitChart {
     this.canvas = el("canvas", { tabindex: 0, role: "img" });
     this.limits = new Limits(unit);
     this.rows = signals.map((signal) => this.#row(signal));
-    const head = ["Signal", "At the cursor", "Least", "Greatest", "Difference"].map((name) => el("th", { scope: "col" }, name));
-    const table = el("table", { class: "extremes" }, el("caption", { class: "unseen" }, `Values in the plot, ${unit || "without a unit"}`), el("thead", {}, el("tr", {}, head)), el("tbody", {}, this.rows.map(({ row }) => row)));
+    const table = this.#table();
     this.element = el("div", {}, el("div", { class: "chart" }, this.canvas), el("div", { class: "below" }, el("div", { class: "wide" }, table), this.limits.element));
     this.chart = new window.Chart(this.canvas, this.#configuration());
   }
@@ -32,6 +34,7 @@ export class UnitChart {
     Object.assign(this.chart.options.scales.x, { min: from, max: to });
     Object.assign(this.chart.options.scales.y, this.limits.values);
     this.chart.update("none");
+    text(this.at, this.time.cursor == null ? "Cursor" : `At ${this.time.cursor.toFixed(3)} s`);
     set(this.canvas, "aria-label", this.#words());
   }
 
@@ -46,8 +49,14 @@ export class UnitChart {
     return Math.min(1, Math.max(0, (event.offsetX - left) / (right - left)));
   }
 
+  #table() {
+    const head = [this.unit, ...HEAD].map((name) => el("th", { scope: "col" }, name));
+    this.at = head[1];
+    return el("table", { class: "extremes" }, el("caption", { class: "unseen" }, `Values in the plot, ${this.unit || "without a unit"}`), el("thead", {}, el("tr", {}, head)), el("tbody", {}, this.rows.map(({ row }) => row)));
+  }
+
   #row({ name, position }) {
-    const cells = Array.from({ length: 4 }, () => el("td", { class: "number" }));
+    const cells = HEAD.map((label) => el("td", { class: "number", data: { label } }));
     return { cells, row: el("tr", {}, el("th", { scope: "row" }, legend(position), name), cells) };
   }
 

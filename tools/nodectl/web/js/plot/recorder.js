@@ -43,7 +43,8 @@ export class Recorder extends EventTarget {
 
   #take({ t, lost, signals }) {
     for (const samples of signals) this.of(samples.signal).take(samples);
-    this.lost += lost;
+    // The number of all lost samples so far.
+    this.lost = lost;
     this.#advance(t);
     this.#tell("samples");
   }

@@ -1,7 +1,13 @@
 // The samples of one signal, in the order of their times.
 
-/** The number of samples of a signal that are kept: at a thousand a second, more than four minutes. */
+/** The number of newest samples of a signal that are kept: at a thousand a second, more than four minutes. */
 export const KEPT = 262_144;
+/** Of each so many older samples, only the least and the greatest one are kept. */
+const REDUCED = 64;
+/** The number of samples that are kept of the older time: more than two hours at a thousand samples a second. */
+const OLD = 262_144;
+/** The older samples are reduced when this number of samples has come. */
+const PART = 32_768;
 
 export class Series {
   constructor() {
@@ -12,6 +18,8 @@ export class Series {
     this.t = [];
     this.v = [];
     this.meaning = null;
+    /** The number of samples at the begin that are left of older ones. */
+    this.old = 0;
   }
 
   /** Takes the samples of one message. */
@@ -21,10 +29,21 @@ export class Series {
       this.v.push(v[i]);
     }
     this.meaning = meaning;
-    if (this.t.length > 2 * KEPT) {
-      this.t.splice(0, this.t.length - KEPT);
-      this.v.splice(0, this.v.length - KEPT);
+    if (this.t.length >= this.old + KEPT + PART) this.#reduce();
+  }
+
+  /** Reduces the samples before the newest ones, and drops the oldest ones beyond the time that is kept. */
+  #reduce() {
+    const end = this.t.length - KEPT;
+    const chosen = [];
+    for (let at = this.old; at < end; at += REDUCED) chosen.push(...this.#extremes(at, Math.min(end, at + REDUCED)));
+    const forgotten = Math.max(0, this.old + chosen.length - OLD);
+    for (const array of [this.t, this.v]) {
+      // In place: copies of arrays of this length would be most of the memory of the page.
+      array.splice(this.old, end - this.old, ...chosen.map((at) => array[at]));
+      array.splice(0, forgotten);
     }
+    this.old += chosen.length - forgotten;
   }
 
   /** The newest value; `undefined` before the first one. */
@@ -77,15 +96,22 @@ export class Series {
 
   /** First, least, greatest, last, and a gap where there is one, in the order of time. */
   #column(start, end) {
+    const chosen = new Set([start, ...this.#extremes(start, end), end - 1]);
+    return [...chosen].sort((a, b) => a - b).map((at) => this.#point(at));
+  }
+
+  /** The positions of the least and the greatest sample, and of a gap where there is one, in the order of time. */
+  #extremes(start, end) {
     let [least, greatest, gap] = [start, start, null];
     for (let at = start; at < end; at += 1) {
       if (this.v[at] == null) gap = at;
-      if (this.v[at] < this.v[least]) least = at;
-      if (this.v[at] > this.v[greatest]) greatest = at;
+      // A comparison with null would take it for 0.
+      else if (this.v[least] == null || this.v[at] < this.v[least]) least = at;
+      if (this.v[at] != null && (this.v[greatest] == null || this.v[at] > this.v[greatest])) greatest = at;
     }
-    const chosen = new Set([start, least, greatest, end - 1]);
+    const chosen = new Set([least, greatest]);
     if (gap != null) chosen.add(gap);
-    return [...chosen].sort((a, b) => a - b).map((at) => this.#point(at));
+    return [...chosen].sort((a, b) => a - b);
   }
 
   #point(at) {

@@ -2,16 +2,18 @@
 
 import { button, el, field, select, set, text } from "../dom.js";
 import { offer } from "../file.js";
-import { address, quantity, seconds, signalKey } from "../format.js";
+import { address, seconds } from "../format.js";
+import { Adder } from "../live/adder.js";
+import { named, SignalTable, statusKey } from "../live/signals.js";
 import { nodeChoice } from "../parts/node_choice.js";
 import { UnitChart } from "../plot/chart.js";
-import { csv, drawing, legend } from "../plot/export.js";
+import { csv, drawing } from "../plot/export.js";
 import { addGestures } from "../plot/gestures.js";
 import { onTheme } from "../plot/theme.js";
 import { Boards } from "../stimuli/boards.js";
 import { TimeWindow } from "../plot/time_window.js";
 
-const LENGTHS = [1, 5, 10, 30, 60, 300];
+const LENGTHS = [[1, "1 s"], [5, "5 s"], [10, "10 s"], [30, "30 s"], [60, "1 min"], [300, "5 min"], [900, "15 min"], [3600, "1 h"]];
 const FRAME_MS = 40;
 const SHOWN_FAULTS = 20;
 
@@ -22,10 +24,11 @@ export function live(bus, recorder) {
 
 class Live {
   constructor(bus, recorder) {
-    Object.assign(this, { bus, recorder, time: new TimeWindow(10), shown: new Map(), offered: [], charts: [], isShown: false });
-    this.table = el("tbody");
+    Object.assign(this, { bus, recorder, time: new TimeWindow(10), shown: new Map(), offered: [], added: new Map(), charts: [], isShown: false });
+    this.table = new SignalTable(this);
+    this.adder = new Adder(bus, (signal) => this.#add(signal));
     this.plots = el("div", { class: "plots" });
-    this.faults = el("ul", { class: "faults", "aria-label": "Faults" });
+    this.faults = el("ul", { class: "faults", "aria-label": "Events" });
     this.empty = el("p", { class: "hint" });
     this.boards = new Boards(bus, ({ node }) => node === bus.chosen);
     this.content = this.#layout();
@@ -45,15 +48,13 @@ class Live {
   }
 
   #layout() {
-    const head = ["Show", "Object", "Signal", "Value", "Age", "Status", "PDO"].map((name) => el("th", { scope: "col" }, name));
-    const table = el("table", { class: "signals" }, el("caption", { class: "unseen" }, "Process values"), el("thead", {}, el("tr", {}, head)), this.table);
-    const side = el("div", { class: "side" }, el("div", { class: "wide" }, table), el("h3", {}, "Faults"), this.faults, this.boards.element);
+    const side = el("div", { class: "side" }, el("div", { class: "wide" }, this.table.element), this.adder.element, el("h3", {}, "Events"), this.faults, this.boards.element);
     return el("div", {}, el("div", { class: "bar" }, nodeChoice(this.bus), ...this.#tools()), this.empty, el("div", { class: "live" }, this.plots, side));
   }
 
   #tools() {
     this.pause = button("Pause", () => this.time.toggle(), { "aria-pressed": "false" });
-    this.length = select(LENGTHS.map((length) => [length, `${length} s`]), 10, (length) => this.time.setLength(Number(length)));
+    this.length = select(LENGTHS, 10, (length) => this.time.setLength(Number(length)));
     return [
       field("Time", this.length),
       el("div", { class: "group", role: "group", "aria-label": "Time axis" },
@@ -73,10 +74,10 @@ class Live {
     bus.on("fault", () => this.#showFaults());
     bus.on("restart", () => this.#showFaults());
     bus.on("connected", () => this.#ask());
-    bus.connection.on("mapping", ({ node }) => node === bus.chosen && this.#ask());
+    bus.connection.on("mapping", ({ node }) => this.#nodes().has(node) && this.#ask());
     recorder.on("samples", () => (this.isStale = true));
     time.addEventListener("change", () => this.#showTime());
-    onTheme(() => this.#makeCharts());
+    onTheme(() => this.#showSignals());
   }
 
   /** Follows the content of the chosen node's TPDOs, also while another view is shown, so that no samples are missing. */
@@ -84,19 +85,59 @@ class Live {
     const node = this.bus.chosen;
     if (node == null || !this.bus.connection.connected) return;
     try {
-      const { signals } = await this.bus.request("signals", { node });
+      const signals = await this.#survey(node);
       if (node !== this.bus.chosen) return;
       this.offered = signals;
       this.#showSignals();
       await this.#follow();
+      // The answer may describe the added signals otherwise than the data sheet.
+      if (this.listed !== JSON.stringify(this.signals)) this.#showSignals();
     } catch (error) {
       text(this.empty, error.message);
     }
   }
 
+  /** The signals of the chosen node. The server must know the PDOs of the other nodes, too, to follow their objects. */
+  async #survey(chosen) {
+    const others = [...this.#nodes()].filter((node) => node !== chosen);
+    const ask = (node) => this.bus.request("signals", { node });
+    const [{ signals }] = await Promise.all([ask(chosen), ...others.map((node) => ask(node).catch(() => null))]);
+    return signals;
+  }
+
+  /** The nodes of which a signal is listed. */
+  #nodes() {
+    return new Set([this.bus.chosen, ...[...this.added.values()].map(({ node }) => node)]);
+  }
+
+  /** The signals of the chosen node, and those that the user has added. */
+  get signals() {
+    const own = new Set(this.offered.map(({ signal }) => signal));
+    const added = [...this.added.keys()].filter((key) => !own.has(key)).map((key) => ({ ...this.added.get(key), ...this.recorder.signals.get(key), isAdded: true }));
+    return named([...this.offered, ...added]);
+  }
+
+  async #add(signal) {
+    this.added.set(signal.signal, signal);
+    this.shown.set(signal.signal, true);
+    await this.#ask();
+  }
+
+  async remove(key) {
+    this.added.delete(key);
+    this.shown.delete(key);
+    await this.#ask();
+  }
+
+  /** Shows or hides the plot of a signal. */
+  plot(key, isShown) {
+    this.shown.set(key, isShown);
+    this.#makeCharts();
+  }
+
   /** Objects in no PDO are read by SDO, only while this view is shown: a node has one SDO channel for all of its masters. */
   async #follow() {
-    const signals = this.offered.filter(({ tpdo }) => tpdo != null || this.isShown);
+    const signals = this.signals.filter(({ tpdo }) => tpdo != null || this.isShown);
     const statuses = this.isShown ? signals.map(statusKey).filter(Boolean) : [];
     await this.recorder.want("live", [...new Set([...signals.map(({ signal }) => signal), ...statuses])]).catch(() => {});
   }
@@ -105,24 +146,11 @@ class Live {
     const numbers = this.offered.filter(({ kind }) => kind !== "text");
     const fresh = numbers.filter(({ signal }) => !this.shown.has(signal)).map(({ signal }) => [signal, true]);
     this.shown = new Map([...this.shown, ...fresh]);
-    this.rows = this.offered.map((signal, position) => this.#row(signal, position));
-    this.table.replaceChildren(...this.rows.map(({ row }) => row));
+    this.listed = JSON.stringify(this.signals);
+    this.table.list(this.signals);
     const isOperational = this.bus.node()?.state === "operational";
     text(this.empty, this.offered.length ? "" : isOperational ? "No TPDO of this node carries a value." : "The node sends TPDOs in the state operational only: start it in the overview.");
     this.#makeCharts();
-  }
-
-  #row(signal, position) {
-    const box = el("input", { type: "checkbox", "aria-label": `Plot ${signal.name}`, prop: { checked: this.shown.get(signal.signal) ?? false, disabled: signal.kind === "text" } });
-    box.addEventListener("change", () => {
-      this.shown.set(signal.signal, box.checked);
-      this.#makeCharts();
-    });
-    const [value, age, status] = [el("td", { class: "number" }), el("td", { class: "number age" }), el("td")];
-    const pdo = signal.tpdo == null ? "SDO" : `TPDO ${signal.tpdo}`;
-    const name = el("th", { scope: "row" }, legend(position), signal.name);
-    const row = el("tr", { data: { signal: signal.signal } }, el("td", {}, box), el("td", {}, address(signal.index, signal.sub)), name, value, age, status, el("td", {}, pdo));
-    return { row, value, age, status, signal };
   }
 
   #makeCharts() {
@@ -135,11 +163,11 @@ class Live {
   /** The chosen signals by their unit, in the order of the table. */
   #units() {
     const units = new Map();
-    this.offered.forEach((signal, position) => {
+    this.signals.forEach((signal, position) => {
       if (!this.shown.get(signal.signal) || signal.kind === "text") return;
       if (!units.has(signal.unit)) units.set(signal.unit, []);
-      const title = `${address(signal.index, signal.sub)} ${signal.name}`;
-      units.get(signal.unit).push({ key: signal.signal, name: signal.name, title, unit: signal.unit, position, status: statusKey(signal) });
+      const title = `${address(signal.index, signal.sub)} ${signal.label}`;
+      units.get(signal.unit).push({ key: signal.signal, name: signal.label, title, unit: signal.unit, position, status: statusKey(signal) });
     });
     return [...units].map(([unit, signals]) => ({ unit, signals }));
   }
@@ -160,39 +188,20 @@ class Live {
   #draw() {
     this.isStale = false;
     for (const chart of this.charts) chart.draw();
-    for (const row of this.rows ?? []) this.#showValue(row);
-  }
-
-  #showValue({ value, age, status, signal }) {
-    const series = this.recorder.of(signal.signal);
-    const state = this.bus.node()?.state;
-    const isOld = signal.tpdo != null && state !== "operational";
-    const since = series.t.length ? Math.max(0, this.recorder.t - series.t.at(-1)) : null;
-    text(age, since == null ? "-" : seconds(since, since < 10 ? 2 : 0));
-    if (series.newest === undefined && !isOld) {
-      text(status, signal.tpdo == null ? "not read yet" : `TPDO ${signal.tpdo} has not come: it is sent on its events (type, event timer)`);
-      return;
-    }
-    text(value, isOld ? "-" : quantity(series.newest, signal.unit));
-    const words = isOld ? `not sent: ${state ?? "not heard"}` : (series.meaning ?? this.#statusOf(signal) ?? (series.newest == null ? "not valid" : "ok"));
-    text(status, words);
-    set(status, "data-kind", ["ok", "valid"].includes(words) ? "good" : "bad");
-  }
-
-  #statusOf(signal) {
-    return this.recorder.series.get(statusKey(signal))?.meaning ?? null;
+    this.table.draw();
   }
 
   #showTime() {
     const { follows, length } = this.time;
     text(this.pause, follows ? "Pause" : "Follow");
     set(this.pause, "aria-pressed", String(!follows));
-    if (LENGTHS.includes(length)) this.length.value = length;
+    if (LENGTHS.some(([known]) => known === length)) this.length.value = length;
     this.isStale = true;
   }
 
   #ownFaults() {
-    return this.bus.faults.filter(({ node }) => node === this.bus.chosen);
+    const nodes = this.#nodes();
+    return this.bus.faults.filter(({ node }) => nodes.has(node));
   }
 
   #showFaults() {
@@ -215,11 +224,4 @@ class Live {
   #svg() {
     offer(`node${this.bus.chosen}.svg`, drawing(this.recorder, this.#units(), this.time, this.#ownFaults()), "image/svg+xml");
   }
-}
-
-/** The status of a process value of CiA 404 (6150h), which is read where no PDO carries it; `null` for any other signal. */
-function statusKey({ node, index, sub }) {
-  const isSecondDevice = (index & 0x800) !== 0;
-  const isProcessValue = [0x6130, 0x7130, 0x9130].includes(index & ~0x800);
-  return isProcessValue ? signalKey(node, isSecondDevice ? 0x6950 : 0x6150, sub) : null;
 }

@@ -1,87 +1,75 @@
-// Overview: the nodes on the bus, and their state.
+// Overview: the bus and its statistics, the nodes, and their state.
 
-import { button, el, set, text } from "../dom.js";
-import { hex, percent, seconds } from "../format.js";
+import { button, el, field, select, set, text } from "../dom.js";
 import { outcome } from "../outcome.js";
+import { events } from "../overview/events.js";
+import { isWanted, SETS, summary } from "../overview/filter.js";
+import { COLUMNS, Row } from "../overview/row.js";
+import { statistics } from "../overview/statistics.js";
 
 const COMMANDS = [["start", "Start"], ["stop", "Stop"], ["preop", "Pre-operational"], ["reset", "Reset"]];
-
-export function overview(bus) {
-  const rows = new Map();
-  const body = el("tbody");
-  const result = outcome();
-  const empty = el("p", { class: "hint" }, "No node is heard yet.");
-  const show = () => showNodes(bus, rows, body, result, empty);
-  bus.on("nodes", show);
-  bus.on("hello", show);
-  const content = el("div", {}, tools(bus, result), result.line, empty, table(body));
-  return { name: "overview", title: "Overview", content };
-}
-
-function tools(bus, result) {
-  const scan = () => result.of("looking for nodes", bus.request("scan"), ({ found }) => (found.length ? `found ${found.join(", ")}` : "no node answers"));
-  const all = COMMANDS.map(([command, label]) => button(`${label} all`, () => command_(bus, result, "all", command)));
-  return el("div", { class: "bar" }, button("Scan", scan), el("div", { class: "group", role: "group", "aria-label": "All nodes" }, all));
-}
 
 /** Commands that end the work of a bus are confirmed where they go to all nodes. */
 const ENDING = ["stop", "preop", "reset", "reset-communication"];
 
-function command_(bus, result, node, command) {
-  if (node === "all" && ENDING.includes(command) && !confirm(`Send "${command}" to all nodes?`)) return undefined;
-  const who = node === "all" ? "all nodes" : `node ${node}`;
-  const said = ({ state }) => `${who}: ${command}${state ? `, now ${state}` : ", sent"}`;
-  return result.of(`${who}: ${command}`, bus.request("nmt", { node, command }), said);
+export function overview(bus) {
+  const view = new Overview(bus);
+  return { name: "overview", title: "Overview", content: view.content, search: view.search };
 }
 
-const COLUMNS = ["Node", "Name", "Personality", "State", "EMCY", "Heartbeat", "Load", "Actions"];
-
-function table(body) {
-  const head = el("tr", {}, COLUMNS.map((name) => el("th", { scope: "col" }, name)));
-  return el("div", { class: "wide" }, el("table", { class: "nodes cards" }, el("caption", { class: "unseen" }, "Nodes on the bus"), el("thead", {}, head), body));
-}
-
-function showNodes(bus, rows, body, result, empty) {
-  const list = bus.list();
-  set(empty, "hidden", list.length > 0);
-  for (const [id, row] of rows) if (!bus.nodes.has(id)) (row.element.remove(), rows.delete(id));
-  for (const [position, node] of list.entries()) {
-    if (!rows.has(node.node)) rows.set(node.node, makeRow(bus, result, node.node));
-    const row = rows.get(node.node);
-    if (body.children[position] !== row.element) body.insertBefore(row.element, body.children[position] ?? null);
-    fillRow(row, node);
+class Overview {
+  constructor(bus) {
+    Object.assign(this, { bus, commands: COMMANDS, rows: new Map(), set: "all" });
+    this.body = el("tbody");
+    this.result = outcome();
+    this.count = el("p", { class: "hint", role: "status" });
+    this.search = el("input", { type: "search", placeholder: "node-ID, name or state", autocomplete: "off", on: { input: () => this.#show() } });
+    this.content = this.#layout();
+    bus.on("nodes", () => this.#show());
+    bus.on("hello", () => this.#show());
+    this.#show();
   }
-}
 
-function makeRow(bus, result, id) {
-  const cells = Object.fromEntries(COLUMNS.slice(1, -1).map((name) => [name, el("td", { data: { label: name } })]));
-  const save = () => result.of(`node ${id}: saving`, bus.request("save", { node: id }), `node ${id}: all parameters saved`);
-  const actions = [...COMMANDS.map(([command, label]) => button(label, () => command_(bus, result, id, command))), button("Save", save)];
-  for (const action of actions) set(action, "aria-label", `${action.textContent} node ${id}`);
-  const look = button(String(id), () => {
-    bus.choose(id);
-    location.hash = "live";
-  }, { class: "plain", "aria-label": `Node ${id}: show its values` });
-  const group = el("div", { class: "group", role: "group", "aria-label": `Node ${id}` }, actions);
-  const element = el("tr", { data: { node: id } }, el("th", { scope: "row", data: { label: "Node" } }, look), Object.values(cells), el("td", { data: { label: "Actions" } }, group));
-  return { element, cells };
-}
+  command(node, command) {
+    if (node === "all" && ENDING.includes(command) && !confirm(`Send "${command}" to all nodes?`)) return undefined;
+    const who = node === "all" ? "all nodes" : `node ${node}`;
+    const said = ({ state }) => `${who}: ${command}${state ? `, now ${state}` : ", sent"}`;
+    return this.result.of(`${who}: ${command}`, this.bus.request("nmt", { node, command }), said);
+  }
 
-function fillRow({ element, cells }, node) {
-  set(element, "data-kind", node.alive ? null : "gone");
-  text(cells.Name, node.name ?? (node.device_type == null ? "not identified yet" : `unknown device ${hex(node.device_type)}`));
-  set(cells.Name, "title", `vendor ${hex(node.vendor)}, product ${hex(node.product)}, revision ${hex(node.revision)}, serial number ${hex(node.serial)}, software ${node.version ?? "-"}, hardware ${node.hardware ?? "-"}${node.note ? `; ${node.note}` : ""}`);
-  text(cells.Personality, node.personality ?? "-");
-  text(cells.State, stateOf(node));
-  set(cells.State, "data-kind", node.alive && node.state === "operational" ? "good" : node.alive ? "warn" : "bad");
-  text(cells.EMCY, node.emcy ? `${seconds(node.emcy.t, 1)}: ${node.emcy.text}` : "none");
-  set(cells.EMCY, "data-kind", node.emcy?.active ? "bad" : "good");
-  text(cells.Heartbeat, node.heartbeat == null ? "none" : seconds(node.heartbeat, 2));
-  text(cells.Load, `${percent(node.load)}, ${node.frames}/s`);
-}
+  save(node) {
+    return this.result.of(`node ${node}: saving`, this.bus.request("save", { node }), `node ${node}: all parameters saved`);
+  }
 
-function stateOf({ alive, state, updating, other_client }) {
-  if (updating) return "updating";
-  const shown = alive ? (state ?? "no heartbeat heard") : "not heard any more";
-  return other_client ? `${shown}, another client is active` : shown;
+  #layout() {
+    const head = el("tr", {}, COLUMNS.map((name) => el("th", { scope: "col" }, name)));
+    const table = el("table", { class: "nodes cards" }, el("caption", { class: "unseen" }, "Nodes on the bus"), el("thead", {}, head), this.body);
+    this.list = el("div", { class: "listing", tabindex: 0, role: "group", "aria-label": "Nodes" }, table);
+    return el("div", {}, statistics(this.bus), this.#tools(), this.result.line, this.count, this.list, el("h3", {}, "Events"), events(this.bus));
+  }
+
+  #tools() {
+    const found = ({ found }) => (found.length ? `found ${found.join(", ")}` : "no node answers");
+    const scan = () => this.result.of("looking for nodes", this.bus.request("scan"), found);
+    const all = COMMANDS.map(([command, label]) => button(`${label} all`, () => this.command("all", command)));
+    const choice = select(SETS, "all", (set) => ((this.set = set), this.#show()));
+    return el("div", { class: "bar" }, button("Scan", scan), el("div", { class: "group", role: "group", "aria-label": "All nodes" }, all), field("Search", this.search), field("Show", choice));
+  }
+
+  #show() {
+    const all = this.bus.list();
+    const wanted = all.filter((node) => isWanted(node, this.set, this.search.value));
+    text(this.count, all.length ? summary(all) : "No node is heard yet.");
+    set(this.list, "hidden", wanted.length === 0);
+    const ids = new Set(wanted.map(({ node }) => node));
+    for (const [id, row] of this.rows) if (!ids.has(id)) (row.element.remove(), this.rows.delete(id));
+    for (const [position, node] of wanted.entries()) this.#place(position, node);
+  }
+
+  #place(position, node) {
+    if (!this.rows.has(node.node)) this.rows.set(node.node, new Row(this, node.node));
+    const row = this.rows.get(node.node);
+    if (this.body.children[position] !== row.element) this.body.insertBefore(row.element, this.body.children[position] ?? null);
+    row.show(node);
+  }
 }

@@ -133,12 +133,14 @@ impl Pump {
             self.looked = now;
             self.nodes.look(t, seconds, self.bit_rate);
             self.rate = self.count.rate(seconds);
+            self.busiest = self.peak.take(self.bit_rate);
+            self.controller = self.bus.as_mut().map(|bus| bus.controller()).unwrap_or_default();
         }
         for (page, entry) in self.pages.iter().filter(|(page, _)| self.setup.hub.has_room(*page)) {
             let status = json!({
                 "event": "status", "t": t, "open": self.bus.is_ok(), "reason": reason, "bit_rate": self.bit_rate,
                 "load": self.rate.load(self.bit_rate), "frames": self.rate.frames, "total": self.count.total,
-                "pages": self.pages.count(), "lost": entry.lost(),
+                "pages": self.pages.count(), "lost": entry.lost(), "peak": self.busiest, "controller": self.controller,
             });
             self.setup.hub.send(page, status.to_string());
         }

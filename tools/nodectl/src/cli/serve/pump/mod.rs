@@ -21,11 +21,11 @@ use super::order::{Order, Refusal};
 use super::pages::Pages;
 use super::port::Outlet;
 use super::schedule::Schedule;
-use super::status::{Count, Rate};
+use super::status::{Count, Peak, Rate};
 use super::tracer::Tracer;
 use super::turn::Turn;
 use crate::Catalogue;
-use crate::bus::{Bus, BusError, clock};
+use crate::bus::{Bus, BusError, Controller, clock};
 use crate::cli::Options;
 use crate::other_clients::OtherClients;
 use crate::page::{Hub, PageId};
@@ -116,6 +116,10 @@ pub(super) struct Pump {
     running: Vec<Running>,
     count: Count,
     rate: Rate,
+    peak: Peak,
+    /// The load of the busiest tenth of the last second.
+    busiest: Option<f64>,
+    controller: Controller,
     /// Nodes whose PDO parameters were written, with the time of the last write.
     remapped: Vec<(NodeId, f64)>,
     /// The catalogues by vendor-ID and product code.
@@ -153,6 +157,9 @@ impl Pump {
             running: Vec::new(),
             count: Count::default(),
             rate: Rate::default(),
+            peak: Peak::default(),
+            busiest: None,
+            controller: Controller::default(),
             remapped: Vec::new(),
             catalogues: BTreeMap::new(),
             stimuli: None,
