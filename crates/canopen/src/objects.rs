@@ -173,7 +173,7 @@ pub const fn emergency() -> [Object; 2] {
 pub const fn heartbeat_consumer<const N: usize>() -> [Object; N] {
     assert!(N >= 2 && N <= 128, "one to 127 nodes are watched");
     let number = Object::highest(0x1016, (N - 1) as u8, "Consumer heartbeat time");
-    list(number, parameter(0x1016, 1, "Watched node and time", Type::Unsigned32))
+    list(number, parameter(0x1016, 1, "Monitored node and time", Type::Unsigned32))
 }
 
 /// 1028h for the nodes 1 to `N` - 1, at most 127: the sub-index is the node-ID, the value the COB-ID of the EMCY of the node.

@@ -259,7 +259,7 @@ pub(super) fn slot(catalogue: &Catalogue, direction: Direction, object: Multiple
         return Err(format!("no {direction} can carry {}, says the data sheet", Place(object)));
     }
     let bits = catalogue.data_type(object).and_then(bits);
-    let bits = bits.ok_or("no data sheet tells how many bits it has, or it is no number")?;
+    let bits = bits.ok_or("no data sheet states how many bits it has, or it is no number")?;
     Ok(u32::from(object.index) << 16 | u32::from(object.sub) << 8 | u32::from(bits))
 }
 

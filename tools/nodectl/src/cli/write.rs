@@ -74,7 +74,7 @@ impl Write {
         }
         let text = self.value.as_deref().unwrap_or_default();
         let data_type = data_type.ok_or_else(|| {
-            Failure::Usage(format!("no data sheet tells the type of {}: give it with --type", Place(at)))
+            Failure::Usage(format!("no data sheet states the type of {}: give it with --type", Place(at)))
         })?;
         let word = catalogue.word(at, text);
         match word.map_or_else(|| self.parse(text, data_type, quantity), Ok) {

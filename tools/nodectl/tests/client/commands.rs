@@ -80,7 +80,7 @@ fn write_is_checked_here_and_there() {
     let wrong = failed(&wire, &["write", "1017", "70000"]);
     assert_eq!(wrong, (2, "1017h:0: \"70000\" is not a whole number from 0 to 65535".to_owned()));
     let wrong = failed(&wire, &["write", "2999", "1"]);
-    assert_eq!(wrong, (2, "no data sheet tells the type of 2999h:0: give it with --type".to_owned()));
+    assert_eq!(wrong, (2, "no data sheet states the type of 2999h:0: give it with --type".to_owned()));
     let refused = failed(&wire, &["write", "1019", "250"]);
     assert_eq!(
         refused,

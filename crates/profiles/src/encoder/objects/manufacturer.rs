@@ -89,7 +89,7 @@ pub(crate) const SENSORS: &[Object] = &[
     Object::new(0x2108, 0, "Factory key", Type::Unsigned32, Access::WriteOnly),
     // Mask of the alarms (6503h) to clear.
     Object::new(0x2109, 0, "Alarm acknowledgement", Type::Unsigned16, Access::WriteOnly).handled(),
-    Object::highest(0x210A, 3, "Commands taken"),
+    Object::highest(0x210A, 3, "Accepted commands"),
     commands(1, "Presets channel 1"),
     commands(2, "Presets channel 2"),
     commands(3, "Acknowledgements"),

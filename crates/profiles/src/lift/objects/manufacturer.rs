@@ -43,7 +43,7 @@ const fn lamp(sub: u8, name: &'static str) -> Object {
 }
 
 pub(super) const OBJECTS: &[Object] = &[
-    parameter(0x2300, 0, "Way of the car per revolution", Type::Unsigned32)
+    parameter(0x2300, 0, "Travel of the car per revolution", Type::Unsigned32)
         .limits(1, 0xFFFF_FFFF)
         .value(200_000)
         .unit("um")
@@ -69,7 +69,7 @@ pub(super) const OBJECTS: &[Object] = &[
     reading(3, "Position unit 3 reading"),
     reading(4, "Position unit 4 reading"),
     // One bit for each: 0 car position units, 1 load measuring unit, 2 input panel unit, 3 output panel unit.
-    parameter(0x2305, 0, "Choice of virtual devices", Type::Unsigned8)
+    parameter(0x2305, 0, "Selection of virtual devices", Type::Unsigned8)
         .limits(0, Devices::ALL.0 as i64)
         .handled(),
     Object::highest(0x2306, 4, "Position unit references"),
@@ -106,9 +106,9 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x2320, 4, "Virtual input of button 2 pressed", Type::Unsigned48),
     // Two equal words: the lamp is not used. Without a used lamp the output panel unit does nothing.
     Object::highest(0x2321, 4, "Lamp words"),
-    parameter(0x2321, 1, "Virtual output that puts lamp 1 out", Type::Unsigned48),
+    parameter(0x2321, 1, "Virtual output that switches lamp 1 off", Type::Unsigned48),
     parameter(0x2321, 2, "Virtual output that lights lamp 1", Type::Unsigned48),
-    parameter(0x2321, 3, "Virtual output that puts lamp 2 out", Type::Unsigned48),
+    parameter(0x2321, 3, "Virtual output that switches lamp 2 off", Type::Unsigned48),
     parameter(0x2321, 4, "Virtual output that lights lamp 2", Type::Unsigned48),
     // 0: off; 10h to 17h: flashing; other values: lit. Written by a multiplexed PDO or by an SDO client.
     Object::highest(0x2322, 2, "Lamps"),

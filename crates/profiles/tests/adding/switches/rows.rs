@@ -25,7 +25,7 @@ pub(super) const ROWS: &[&[Object]] = &[
         Object::new(0x2400, 2, "Count of switch 2", Type::Unsigned16, Access::ReadOnly)
             .mappable(Mapping::Tpdo),
         Object::new(0x2401, 0, "Zero counts", Type::Unsigned32, Access::WriteOnly).handled(),
-        Object::new(0x2402, 0, "Commands taken", Type::Unsigned8, Access::ReadOnly),
+        Object::new(0x2402, 0, "Accepted commands", Type::Unsigned8, Access::ReadOnly),
         Object::new(0x2403, 0, "Inputs at the last SYNC", Type::Unsigned8, Access::ReadOnly)
             .mappable(Mapping::Tpdo),
         Object::highest(0x6000, 1, "Read input 8 bit"),

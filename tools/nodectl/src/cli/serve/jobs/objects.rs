@@ -167,7 +167,7 @@ fn encode(
     let refuse = |words: String| Failure::Usage(format!("{}: {words}", Place(at)));
     let data_type = catalogue
         .data_type(at)
-        .ok_or_else(|| refuse("no data sheet tells the type of this object".to_owned()))?;
+        .ok_or_else(|| refuse("no data sheet states the type of this object".to_owned()))?;
     let value = catalogue.word(at, text).map_or_else(|| quantity.parse(text, data_type), Ok);
     let value = value.map_err(|error| refuse(error.to_string()))?;
     if !catalogue.allows(at, node, &value) {

@@ -1,7 +1,7 @@
 // The lift: CiA 417.
 
 export const LIFT = {
-  0x2300: "Way of the car in one revolution of a rotary sensor, in um.",
+  0x2300: "Travel of the car in one revolution of a rotary sensor, in um.",
   0x2301: "Which sensor a position unit has: 1 or 2; 0 where there is no such unit.",
   0x2302: "What a preset has found: it is added to the position.",
   0x2303: "What is wrong with a position unit, a bit each: above or below its limits, no reading that can be, not referenced.",
