@@ -98,12 +98,11 @@ impl<O: Objects> Server<O> {
         let at = Multiplexer::parse(frame);
         self.begin(at, objects);
         // Most downloads are expedited: their data is used directly from the frame.
-        let result = match Initiate::expedited(frame) {
-            Some(data) => objects.write(at, data, now),
+        let answer = match Initiate::expedited(frame) {
+            Some(data) => self.write(at, data, objects, now),
             None => self.download(at, frame, objects, now),
         };
-        let answer = result.map(|()| self.set_reply(Response::Downloaded(at)));
-        self.conclude(answer, objects, now)
+        self.settle(answer, objects, now)
     }
 
     /// Takes the request that begins an upload.
@@ -149,9 +148,7 @@ impl<O: Objects> Server<O> {
 
     fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
-        let is_last;
-        (self.reply, is_last) = upload.next(toggle, &mut self.buffer, objects)?;
-        if is_last {
+        if upload.next(toggle, &mut self.reply, &mut self.buffer, objects)? {
             if O::PARTS {
                 upload.source().close(true, objects);
             }
@@ -167,24 +164,34 @@ impl<O: Objects> Server<O> {
         frame: &[u8; 8],
         objects: &mut O,
         now: Tick,
-    ) -> Result<(), Abort> {
+    ) -> Answer {
         let value = match Initiate::parse(frame) {
             Initiate::Expedited(bytes) => bytes,
             Initiate::Unsized(data) => unsized_value(data, at, objects)?,
             Initiate::Segmented(size) => {
                 self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
-                return Ok(());
+                return Ok(self.set_reply(Response::Downloaded(at)));
             }
         };
-        objects.write(at, value.as_slice(), now)
+        self.write(at, value.as_slice(), objects, now)
+    }
+
+    /// Writes a value that has arrived in one piece.
+    #[inline]
+    fn write(&mut self, at: Multiplexer, value: &[u8], objects: &mut O, now: Tick) -> Answer {
+        objects.write(at, value, now)?;
+        self.set_reply(Response::Downloaded(at));
+        Ok(self.written(objects))
     }
 
     fn download_segment(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
         let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
-        if download.take(frame, &mut self.buffer, objects, now)? {
+        let is_complete = download.take(frame, &mut self.buffer, objects, now)?;
+        if is_complete {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 }))
+        self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 });
+        Ok(!is_complete || self.written(objects))
     }
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
@@ -207,7 +214,8 @@ impl<O: Objects> Server<O> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
-        Ok(self.set_reply(Response::BlockDownloaded))
+        self.set_reply(Response::BlockDownloaded);
+        Ok(self.written(objects))
     }
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
