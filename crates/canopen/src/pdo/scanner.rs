@@ -82,8 +82,6 @@ impl<L: Array<Watched>> List<L> {
         }
     }
 
-    // Not inlined: many callers.
-    #[inline(never)]
     fn iter_mut(&mut self) -> core::slice::IterMut<'_, Watched> {
         self.memory.as_mut().get_mut(..self.len).unwrap_or_default().iter_mut()
     }

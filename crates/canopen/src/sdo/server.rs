@@ -189,7 +189,7 @@ impl<O: Objects> Server<O> {
         true
     }
 
-    /// Ends a transfer that has written. Returns whether there is a reply now: the one to a write that takes time is held
+    /// The reply to a request that may have written is set. Returns whether there is a reply now: the one to a write that takes time is held
     /// back.
     #[inline]
     fn written(&mut self, objects: &mut O) -> bool {

@@ -98,10 +98,14 @@ impl<O: Objects> Server<O> {
         let at = Multiplexer::parse(frame);
         self.begin(at, objects);
         // Most downloads are expedited: their data is used directly from the frame.
-        let answer = match Initiate::expedited(frame) {
-            Some(data) => self.write(at, data, objects, now),
+        let result = match Initiate::expedited(frame) {
+            Some(data) => objects.write(at, data, now),
             None => self.download(at, frame, objects, now),
         };
+        let answer = result.map(|()| {
+            self.set_reply(Response::Downloaded(at));
+            self.written(objects)
+        });
         self.settle(answer, objects, now)
     }
 
@@ -164,24 +168,16 @@ impl<O: Objects> Server<O> {
         frame: &[u8; 8],
         objects: &mut O,
         now: Tick,
-    ) -> Answer {
+    ) -> Result<(), Abort> {
         let value = match Initiate::parse(frame) {
             Initiate::Expedited(bytes) => bytes,
             Initiate::Unsized(data) => unsized_value(data, at, objects)?,
             Initiate::Segmented(size) => {
                 self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
-                return Ok(self.set_reply(Response::Downloaded(at)));
+                return Ok(());
             }
         };
-        self.write(at, value.as_slice(), objects, now)
-    }
-
-    /// Writes a value that has arrived in one piece.
-    #[inline]
-    fn write(&mut self, at: Multiplexer, value: &[u8], objects: &mut O, now: Tick) -> Answer {
-        objects.write(at, value, now)?;
-        self.set_reply(Response::Downloaded(at));
-        Ok(self.written(objects))
+        objects.write(at, value.as_slice(), now)
     }
 
     fn download_segment(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
