@@ -102,8 +102,11 @@ impl<O: Objects> Server<O> {
             Some(data) => objects.write(at, data, now),
             None => self.download(at, frame, objects, now),
         };
-        let answer = result.map(|()| self.set_reply(Response::Downloaded(at)));
-        self.conclude(answer, objects, now)
+        let answer = result.map(|()| {
+            self.set_reply(Response::Downloaded(at));
+            self.written(objects)
+        });
+        self.settle(answer, objects, now)
     }
 
     /// Takes the request that begins an upload.
@@ -149,9 +152,7 @@ impl<O: Objects> Server<O> {
 
     fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
-        let is_last;
-        (self.reply, is_last) = upload.next(toggle, &mut self.buffer, objects)?;
-        if is_last {
+        if upload.next(toggle, &mut self.reply, &mut self.buffer, objects)? {
             if O::PARTS {
                 upload.source().close(true, objects);
             }
@@ -181,10 +182,12 @@ impl<O: Objects> Server<O> {
 
     fn download_segment(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
         let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
-        if download.take(frame, &mut self.buffer, objects, now)? {
+        let is_complete = download.take(frame, &mut self.buffer, objects, now)?;
+        if is_complete {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 }))
+        self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 });
+        Ok(!is_complete || self.written(objects))
     }
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
@@ -207,7 +210,8 @@ impl<O: Objects> Server<O> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
-        Ok(self.set_reply(Response::BlockDownloaded))
+        self.set_reply(Response::BlockDownloaded);
+        Ok(self.written(objects))
     }
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
