@@ -1,4 +1,4 @@
-"""`nodectl trace --by-id`, `replay` and `map --dbc`, judged by python-can's reader of logs and by cantools."""
+"""`nodectl trace --by-id`, `replay`, `send` and `map --dbc`, judged by python-can's reader of logs and by cantools."""
 
 import json
 import os
@@ -76,6 +76,27 @@ def test_a_log_is_sent_again(log):
     master = Master(simulator)
     assert (master.read(0x1017, 0), master.read(0x1800, 5)) == (100, 20)
     master.close()
+    simulator.quit()
+
+
+@pytest.mark.parametrize("rate", ["125", "1000"])
+def test_each_sync_that_is_sent_brings_a_tpdo(rate):
+    simulator = Simulator("--bitrate", rate, "--node", "1:encoder")
+    master = Master(simulator)
+    master.node.nmt.send_command(0x01)
+    master.close()
+    bus = simulator.bus()
+    sent = nodectl(simulator, "send", "080#", "--count", "3", "--every", "50")
+    assert (sent.returncode, sent.stdout) == (0, "3 frames sent\n"), sent.stderr
+    seen = []
+    while seen.count(0x281) < 3:
+        message = bus.recv(10)
+        assert message is not None, seen
+        seen += [message.arbitration_id] if message.arbitration_id in (0x080, 0x281) else []
+    assert seen == [0x080, 0x281] * 3
+    refused = nodectl(simulator, "send", "800#")
+    assert refused.returncode == 2 and "such as 201#0102" in refused.stderr
+    bus.shutdown()
     simulator.quit()
 
 

@@ -27,6 +27,7 @@ mod replacement;
 mod replay;
 mod rules;
 mod scan;
+mod send;
 mod serve;
 mod session;
 mod sheets;
@@ -77,6 +78,7 @@ enum Command {
     Record(record::Record),
     Trace(trace::Trace),
     Replay(replay::Replay),
+    Send(send::Send),
     Bus(bus::Bus),
     Net(net::Net),
     Simulate(simulate::Simulate),
@@ -146,6 +148,7 @@ impl Cli {
             Command::Record(record) => record.run(session),
             Command::Trace(trace) => trace.run(session),
             Command::Replay(replay) => replay.run(session),
+            Command::Send(send) => send.run(session),
             Command::Bus(bus) => bus.run(session),
             Command::Net(net) => net.run(session),
             Command::Simulate(simulate) => simulate.run(session),

@@ -303,7 +303,9 @@ pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
     let node = node.get();
     match heard {
         Some(Heard { state: Some(State::Stopped), .. }) => {
-            format!("the node is stopped and answers no request: `nodectl --node {node} nmt preop` ends this state")
+            format!(
+                "the node is stopped and answers no request: `nodectl --node {node} nmt preop` ends this state"
+            )
         }
         Some(Heard { state, .. }) => {
             let state =

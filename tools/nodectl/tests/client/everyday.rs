@@ -110,10 +110,7 @@ fn every_command_has_a_hint_for_a_silent_node() {
         let wire = Wire::new(vec![Pressure::new(1)]);
         let (code, text) = failed(&wire, &[line, &["-n", "9"]].concat());
         assert_eq!(code, 3);
-        assert!(
-            text.contains("node 9 is silent: is it on") && text.contains("nodectl scan"),
-            "{text}"
-        );
+        assert!(text.contains("node 9 is silent: is it on") && text.contains("nodectl scan"), "{text}");
     }
 }
 

@@ -161,9 +161,9 @@ fn a_node_that_has_taken_the_program_back_says_why() {
     wire.station(|loaders| loaders[0].flash().takes_back = Some(program("1.0.0")));
     let error = one(&wire, &image(NEW), &options(), &mut Diary::default()).unwrap_err();
     assert!(
-        error
-            .to_string()
-            .ends_with("the new program started three times without being confirmed; the previous program runs again"),
+        error.to_string().ends_with(
+            "the new program started three times without being confirmed; the previous program runs again"
+        ),
         "{error}"
     );
 }

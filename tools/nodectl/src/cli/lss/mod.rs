@@ -146,7 +146,8 @@ impl Lss {
                 if store {
                     master.store()?;
                 }
-                let rate = if kbit == 0 { "automatic detection".to_owned() } else { format!("{kbit} kbit/s") };
+                let rate =
+                    if kbit == 0 { "automatic detection".to_owned() } else { format!("{kbit} kbit/s") };
                 format!("bit rate: {rate}{}", kept(store))
             }
             Command::Store => {
