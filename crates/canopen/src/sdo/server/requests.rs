@@ -76,10 +76,14 @@ impl<O: Objects> Server<O> {
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
-            2 => match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
-                Some(end) => Ok(self.set_reply(Response::BlockUploadEnd(end))),
-                None => Ok(false),
-            },
+            2 => {
+                let sender = self.sender()?;
+                if !sender.acknowledge(sequence, block_size, is_repeated)? {
+                    return Ok(false);
+                }
+                let end = sender.end();
+                Ok(self.set_reply(Response::BlockUploadEnd(end)))
+            }
             _ => self.sender()?.start(is_repeated).map(|()| false),
         }
     }
@@ -102,10 +106,10 @@ impl<O: Objects> Server<O> {
             Some(data) => objects.write(at, data, now),
             None => self.download(at, frame, objects, now),
         };
-        let answer = result.map(|()| {
-            self.set_reply(Response::Downloaded(at));
-            self.written(objects)
-        });
+        let answer = result.map(|()| self.set_reply(Response::Downloaded(at)));
+        if answer == Ok(true) && !self.written(objects) {
+            return self.settle(Ok(false), objects, now);
+        }
         self.settle(answer, objects, now)
     }
 
