@@ -1,8 +1,9 @@
 //! Segmented transfers (CiA 301, 7.2.4.3.4 and 7.2.4.3.7).
 
 use super::objects::{BUFFER, Sink, Source};
-use super::{Abort, Bytes, Objects, TOGGLE};
+use super::{Abort, Objects, TOGGLE};
 use crate::Tick;
+use crate::copy::copy;
 
 /// An upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +40,19 @@ impl Upload {
         } else {
             self.source.content(buffer, objects)?.get(self.sent..).unwrap_or(&[])
         };
-        let [command, data @ ..] = frame;
+        // Written apart and then set: in its place, the compiler would call `memmove` for seven bytes.
+        let mut new = [0; 8];
+        let [command, data @ ..] = &mut new;
         let len = content.len().min(data.len());
         match content.first_chunk() {
             Some(full) => *data = *full,
-            None => *data = Bytes::from_slice(content).padded(),
+            None => copy(data, content),
         }
         self.sent += len;
         self.toggle = !requested;
         let is_last = self.sent == self.source.len();
         *command = if requested { TOGGLE } else { 0 } | in_segment(7 - len) << 1 | u8::from(is_last);
+        *frame = new;
         Ok(is_last)
     }
 }
