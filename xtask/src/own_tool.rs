@@ -67,7 +67,9 @@ mod tests {
             .unwrap();
         let list: serde_json::Value = serde_json::from_slice(&list.stdout).unwrap();
         let targets = |package: &serde_json::Value| package["targets"].as_array().unwrap().clone();
-        for program in ["flash", "protect", "sign", "bench", "bringup", "bringup-emulated", "glitch", "callgraph"] {
+        for program in
+            ["flash", "protect", "sign", "bench", "bringup", "bringup-emulated", "glitch", "callgraph"]
+        {
             let packages = list["packages"].as_array().unwrap();
             let own = packages.iter().find(|found| found["name"] == package(program));
             let has = own.is_some_and(|own| targets(own).iter().any(|target| target["name"] == program));
