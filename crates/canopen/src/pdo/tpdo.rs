@@ -8,7 +8,6 @@
 //! inhibit time and the event timer determine when the application is asked for its waiting events.
 
 use super::{Choices, Layout, Links, ProcessContext};
-use crate::array::Element;
 use crate::dictionary::Transmission;
 use crate::sync::Sync;
 use crate::transmit::RETRY;
@@ -37,7 +36,7 @@ impl Settings {
     const UNUSED: Settings = Settings {
         id: CanId::NMT,
         answers_remote: false,
-        transmission: Transmission::SyncAcyclic,
+        transmission: Transmission::Timer,
         inhibit: 0,
         event: 0,
         sync_start: 0,
@@ -102,24 +101,23 @@ impl Events {
     const BEGIN: Events = Events { may_wait: true, is_open: true, is_silent: false };
 }
 
-impl Element for Tpdo {
-    const NEW: Tpdo = Tpdo {
-        // Set for all PDOs when the chains are made.
-        links: Links::NONE,
-        is_valid: false,
-        settings: Settings::UNUSED,
-        pending: false,
-        syncs: 0,
-        is_counting: false,
-        data: None,
-        event_due: Tick::NEVER,
-        sent: Tick::NEVER,
-        inhibited_until: Tick::NEVER,
-        events: Events::NONE,
-    };
-}
-
 impl Tpdo {
+    pub(crate) const fn new() -> Tpdo {
+        Tpdo {
+            links: Links::END,
+            is_valid: false,
+            settings: Settings::UNUSED,
+            pending: false,
+            syncs: 0,
+            is_counting: false,
+            data: None,
+            event_due: Tick::NEVER,
+            sent: Tick::NEVER,
+            inhibited_until: Tick::NEVER,
+            events: Events::NONE,
+        }
+    }
+
     /// The epoch of the clock has moved.
     pub(crate) fn shift(&mut self, by: Span) {
         self.event_due.shift(by);

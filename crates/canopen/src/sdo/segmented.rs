@@ -22,14 +22,13 @@ impl Upload {
         Upload { source, sent: 0, toggle: false }
     }
 
-    /// Sets the frame of the next segment. Returns whether the segment is the last one.
+    /// The frame of the next segment, and whether it is the last one.
     pub(super) fn next<O: Objects>(
         &mut self,
         requested: bool,
-        frame: &mut [u8; 8],
         buffer: &mut [u8; BUFFER],
         objects: &mut O,
-    ) -> Result<bool, Abort> {
+    ) -> Result<([u8; 8], bool), Abort> {
         if requested != self.toggle {
             return Err(Abort::Toggle);
         }
@@ -40,9 +39,8 @@ impl Upload {
         } else {
             self.source.content(buffer, objects)?.get(self.sent..).unwrap_or(&[])
         };
-        // Written apart and then set: in its place, the compiler would call `memmove` for seven bytes.
-        let mut new = [0; 8];
-        let [command, data @ ..] = &mut new;
+        let mut frame = [0; 8];
+        let [command, data @ ..] = &mut frame;
         let len = content.len().min(data.len());
         match content.first_chunk() {
             Some(full) => *data = *full,
@@ -52,8 +50,7 @@ impl Upload {
         self.toggle = !requested;
         let is_last = self.sent == self.source.len();
         *command = if requested { TOGGLE } else { 0 } | in_segment(7 - len) << 1 | u8::from(is_last);
-        *frame = new;
-        Ok(is_last)
+        Ok((frame, is_last))
     }
 }
 

@@ -8,7 +8,6 @@ use super::block_upload::Sender;
 use super::objects::BUFFER;
 use super::segmented::{Download, Upload};
 use super::{Abort, BlockSegment, BlockSize, Multiplexer, Objects, Response};
-use crate::array::Element;
 use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Span, Tick, Transmit};
 use core::marker::PhantomData;
@@ -56,7 +55,7 @@ impl<O: Objects> Server<O> {
             transfer: Transfer::Idle,
             multiplexer: Multiplexer { index: 0, sub: 0 },
             buffer: [0; BUFFER],
-            active: Tick::NEVER,
+            active: Tick::PAST,
             previous: [0; 8],
             is_answered: false,
             reply: [0; 8],
@@ -151,7 +150,7 @@ impl<O: Objects> Server<O> {
             Some(segment) => self.take_block_segment(segment, objects),
             None => self.dispatch(frame, is_repeated, objects, now),
         };
-        let has_reply = self.settle(answer, objects, now);
+        let has_reply = self.conclude(answer, objects, now);
         (self.previous, self.is_answered) = (*frame, has_reply);
         has_reply
     }
@@ -189,15 +188,13 @@ impl<O: Objects> Server<O> {
         true
     }
 
-    /// The reply to a request that may have written is set. Returns whether there is a reply now: the one to a write that takes time is held
-    /// back.
-    #[inline]
-    fn written(&mut self, objects: &mut O) -> bool {
-        let waits = objects.take_deferred();
-        if waits {
+    /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
+    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
+        if answer == Ok(true) && objects.take_deferred() {
             self.transfer = Transfer::Deferred;
+            return self.settle(Ok(false), objects, now);
         }
-        !waits
+        self.settle(answer, objects, now)
     }
 
     /// Ends the transfer. The application learns of a domain whose transfer is not complete.
@@ -290,10 +287,6 @@ impl<O> core::fmt::Debug for Channel<O> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Channel").finish_non_exhaustive()
     }
-}
-
-impl<O: Objects> Element for Channel<O> {
-    const NEW: Channel<O> = Channel::new();
 }
 
 impl<O: Objects> Channel<O> {
