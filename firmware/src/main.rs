@@ -18,12 +18,12 @@
 mod bit_rate;
 mod bus;
 mod configuration;
-mod exchange;
 mod position_inputs;
 mod power_on;
 mod process;
 mod services;
 mod shared;
+mod snapshot_slot;
 mod storage_task;
 
 use bsp::pac::Interrupt;
@@ -62,23 +62,27 @@ mod app {
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TaskEnd,
         TimeInterrupt, Transmitter, Watchdog,
     };
-    use node::{Measurement, Protocol, StoreJob, StoredPositionRecord};
+    use node::{Measurement, Parameters, Protocol, StoreJob, StoredPositionRecord};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::configuration::Loaded;
-    use crate::exchange::Exchange;
     use crate::position_inputs::PositionReader;
     use crate::process::Process;
     use crate::services::{Services, StartUpFaults};
-    use crate::storage_task::StorageTask;
+    use crate::snapshot_slot::SnapshotSlot;
+    use crate::storage_task::{Retained, StorageTask};
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, power_on};
 
     #[shared]
     struct Shared {
         protocol: &'static mut Protocol,
         transmit: TransmitQueue,
-        exchange: Exchange,
+        snapshot: SnapshotSlot,
+        /// New parameters, until the sampling task has taken them.
+        parameters: Option<Parameters>,
         watchdog: Watchdog,
+        /// The words retained by the last sample.
+        retained: Retained,
     }
 
     #[local]
@@ -86,7 +90,6 @@ mod app {
         receiver_process: Receiver,
         receiver_services: Receiver,
         front_end: FrontEnd,
-        inputs: Inputs,
         position: PositionReader,
         buttons: Buttons,
         measurement: &'static mut Measurement,
@@ -126,14 +129,15 @@ mod app {
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
-            exchange: Exchange::new(parameters),
+            snapshot: SnapshotSlot::default(),
+            parameters: Some(parameters),
             watchdog: board.watchdog.supervise(),
+            retained: None,
         };
         let mut local = Local {
             receiver_process,
             receiver_services,
             front_end: board.front_end,
-            inputs: Inputs::default(),
             position: PositionReader::new(board.ssi, surroundings),
             buttons: board.buttons,
             measurement: power_on::make(
@@ -184,23 +188,28 @@ mod app {
     }
 
     /// Runs once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, inputs, position, buttons, measurement, backup],
-           shared = [exchange, &watchdog])]
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup],
+           shared = [snapshot, parameters, retained, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let _end = TaskEnd;
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
-        let sample::LocalResources { inputs, position, measurement, backup, buttons, .. } = cx.local;
-        (inputs.analogue, inputs.digital) = (configuration::raw_sample(&sums), buttons.sample());
-        cx.shared.exchange.lock(|exchange| {
-            if let Some(new) = &exchange.parameters {
+        let (measurement, position) = (&mut *cx.local.measurement, cx.local.position);
+        cx.shared.parameters.lock(|parameters| {
+            if let Some(new) = parameters {
                 measurement.apply(new);
-                position.apply(new.position_inputs(), &mut inputs.position);
-                exchange.parameters = None;
+                position.apply(new.position_inputs());
+                *parameters = None;
             }
-            position.read(counted, &mut inputs.position);
-            measurement.update(inputs, exchange.renew());
-            let words = exchange.retained.get_or_insert([0; RETAINED_WORDS]);
-            if measurement.retain(words) { backup.write(words) } else { exchange.retained = None }
+        });
+        let inputs = Inputs {
+            analogue: configuration::raw_sample(&sums),
+            position: position.read(counted),
+            digital: cx.local.buttons.sample(),
+        };
+        cx.shared.snapshot.lock(|slot| measurement.update(&inputs, slot.renew()));
+        cx.shared.retained.lock(|retained| {
+            let words = retained.get_or_insert([0; RETAINED_WORDS]);
+            if measurement.retain(words) { cx.local.backup.write(words) } else { *retained = None }
         });
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
@@ -216,32 +225,32 @@ mod app {
     }
 
     #[task(binds = TIM2, priority = 3, local = [time, process],
-           shared = [protocol, transmit, exchange, &watchdog])]
+           shared = [protocol, transmit, snapshot, &watchdog])]
     fn process(mut cx: process::Context) {
         let _end = TaskEnd;
         let [_, services_due] = cx.local.time.acknowledge();
         cx.local.process.wake_services(services_due);
-        cx.local.process.run(&mut cx.shared.exchange, &mut (cx.shared.protocol, cx.shared.transmit));
+        cx.local.process.run(&mut cx.shared.snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
         cx.shared.watchdog.progress(Part::Process);
     }
 
     #[task(binds = CAN1_SCE, priority = 2, local = [services],
-           shared = [protocol, transmit, exchange, &watchdog])]
+           shared = [protocol, transmit, parameters, &watchdog])]
     fn serve(mut cx: serve::Context) {
         let _end = TaskEnd;
         let mut node = (cx.shared.protocol, cx.shared.transmit);
         cx.local.services.run(&mut node);
         if let Some(new) = cx.local.services.take_parameters() {
-            cx.shared.exchange.lock(|exchange| exchange.parameters = Some(new));
+            cx.shared.parameters.lock(|parameters| *parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);
     }
 
-    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, exchange, &watchdog])]
+    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
     fn store(mut cx: store::Context) {
         let _end = TaskEnd;
         let mut node = (cx.shared.protocol, cx.shared.transmit);
-        let retained = cx.shared.exchange.lock(|exchange| exchange.retained);
+        let retained = cx.shared.retained.lock(|retained| *retained);
         cx.local.storage.judge(&mut node);
         cx.local.storage.refill_clears();
         cx.local.storage.report_programs(&mut node);
