@@ -25,7 +25,7 @@ pub enum State {
     BusOff,
 }
 
-/// What an adapter reports. `None` is a fact that the adapter does not report.
+/// The report of an adapter about its controller. A value is `None` where the adapter does not report it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Controller {
     /// The state of the controller.

@@ -42,7 +42,7 @@ pub trait Bus {
     /// [`BusError::Lost`].
     fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError>;
 
-    /// What the adapter has reported about its controller. A call may request a new report for the next call.
+    /// The last report of the adapter about its controller. A call may request a new report for the next call.
     fn controller(&mut self) -> Controller {
         Controller::default()
     }
