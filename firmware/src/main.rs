@@ -18,12 +18,12 @@
 mod bit_rate;
 mod bus;
 mod configuration;
+mod exchange;
 mod position_inputs;
 mod power_on;
 mod process;
 mod services;
 mod shared;
-mod snapshot_slot;
 mod storage_task;
 
 use bsp::pac::Interrupt;
@@ -62,27 +62,23 @@ mod app {
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TaskEnd,
         TimeInterrupt, Transmitter, Watchdog,
     };
-    use node::{Measurement, Parameters, Protocol, StoreJob, StoredPositionRecord};
+    use node::{Measurement, Protocol, StoreJob, StoredPositionRecord};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::configuration::Loaded;
+    use crate::exchange::Exchange;
     use crate::position_inputs::PositionReader;
     use crate::process::Process;
     use crate::services::{Services, StartUpFaults};
-    use crate::snapshot_slot::SnapshotSlot;
-    use crate::storage_task::{Retained, StorageTask};
+    use crate::storage_task::StorageTask;
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, power_on};
 
     #[shared]
     struct Shared {
         protocol: &'static mut Protocol,
         transmit: TransmitQueue,
-        snapshot: SnapshotSlot,
-        /// New parameters, until the sampling task has taken them.
-        parameters: Option<Parameters>,
+        exchange: Exchange,
         watchdog: Watchdog,
-        /// The words retained by the last sample.
-        retained: Retained,
     }
 
     #[local]
@@ -90,6 +86,7 @@ mod app {
         receiver_process: Receiver,
         receiver_services: Receiver,
         front_end: FrontEnd,
+        inputs: Inputs,
         position: PositionReader,
         buttons: Buttons,
         measurement: &'static mut Measurement,
@@ -129,15 +126,14 @@ mod app {
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
-            snapshot: SnapshotSlot::default(),
-            parameters: Some(parameters),
+            exchange: Exchange::new(parameters),
             watchdog: board.watchdog.supervise(),
-            retained: None,
         };
         let mut local = Local {
             receiver_process,
             receiver_services,
             front_end: board.front_end,
+            inputs: Inputs::default(),
             position: PositionReader::new(board.ssi, surroundings),
             buttons: board.buttons,
             measurement: power_on::make(
@@ -188,28 +184,23 @@ mod app {
     }
 
     /// Runs once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup],
-           shared = [snapshot, parameters, retained, &watchdog])]
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, inputs, position, buttons, measurement, backup],
+           shared = [exchange, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let _end = TaskEnd;
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
-        let (measurement, position) = (&mut *cx.local.measurement, cx.local.position);
-        cx.shared.parameters.lock(|parameters| {
-            if let Some(new) = parameters {
+        let sample::LocalResources { inputs, position, measurement, backup, buttons, .. } = cx.local;
+        (inputs.analogue, inputs.digital) = (configuration::raw_sample(&sums), buttons.sample());
+        cx.shared.exchange.lock(|exchange| {
+            if let Some(new) = &exchange.parameters {
                 measurement.apply(new);
-                position.apply(new.position_inputs());
-                *parameters = None;
+                position.apply(new.position_inputs(), &mut inputs.position);
+                exchange.parameters = None;
             }
-        });
-        let inputs = Inputs {
-            analogue: configuration::raw_sample(&sums),
-            position: position.read(counted),
-            digital: cx.local.buttons.sample(),
-        };
-        cx.shared.snapshot.lock(|slot| measurement.update(&inputs, slot.renew()));
-        cx.shared.retained.lock(|retained| {
-            let words = retained.get_or_insert([0; RETAINED_WORDS]);
-            if measurement.retain(words) { cx.local.backup.write(words) } else { *retained = None }
+            position.read(counted, &mut inputs.position);
+            measurement.update(inputs, exchange.renew());
+            let words = exchange.retained.get_or_insert([0; RETAINED_WORDS]);
+            if measurement.retain(words) { backup.write(words) } else { exchange.retained = None }
         });
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
@@ -225,32 +216,32 @@ mod app {
     }
 
     #[task(binds = TIM2, priority = 3, local = [time, process],
-           shared = [protocol, transmit, snapshot, &watchdog])]
+           shared = [protocol, transmit, exchange, &watchdog])]
     fn process(mut cx: process::Context) {
         let _end = TaskEnd;
         let [_, services_due] = cx.local.time.acknowledge();
         cx.local.process.wake_services(services_due);
-        cx.local.process.run(&mut cx.shared.snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
+        cx.local.process.run(&mut cx.shared.exchange, &mut (cx.shared.protocol, cx.shared.transmit));
         cx.shared.watchdog.progress(Part::Process);
     }
 
     #[task(binds = CAN1_SCE, priority = 2, local = [services],
-           shared = [protocol, transmit, parameters, &watchdog])]
+           shared = [protocol, transmit, exchange, &watchdog])]
     fn serve(mut cx: serve::Context) {
         let _end = TaskEnd;
         let mut node = (cx.shared.protocol, cx.shared.transmit);
         cx.local.services.run(&mut node);
         if let Some(new) = cx.local.services.take_parameters() {
-            cx.shared.parameters.lock(|parameters| *parameters = Some(new));
+            cx.shared.exchange.lock(|exchange| exchange.parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);
     }
 
-    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
+    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, exchange, &watchdog])]
     fn store(mut cx: store::Context) {
         let _end = TaskEnd;
         let mut node = (cx.shared.protocol, cx.shared.transmit);
-        let retained = cx.shared.retained.lock(|retained| *retained);
+        let retained = cx.shared.exchange.lock(|exchange| exchange.retained);
         cx.local.storage.judge(&mut node);
         cx.local.storage.refill_clears();
         cx.local.storage.report_programs(&mut node);

@@ -16,19 +16,20 @@ impl PositionReader {
     }
 
     /// Takes the settings; they act from the next millisecond on.
-    pub(crate) fn apply(&mut self, settings: PositionInputs) {
+    pub(crate) fn apply(&mut self, settings: PositionInputs, raw: &mut RawEncoder) {
         self.settings = settings;
+        let board = if settings.are_used { self.board } else { Board::default() };
+        *raw = RawEncoder { board, ..RawEncoder::default() };
     }
 
-    /// The readings for the millisecond of this count. The SSI word is that of the last millisecond, and the next word
-    /// is started.
-    pub(crate) fn read(&mut self, counted: Counted) -> RawEncoder {
+    /// Writes the readings for the millisecond of this count in their place. The SSI word is that of the last
+    /// millisecond, and the next word is started.
+    pub(crate) fn read(&mut self, counted: Counted, raw: &mut RawEncoder) {
         if !self.settings.are_used {
-            return RawEncoder::default();
+            return;
         }
-        let Counted { counter, index, has_gap } = counted;
+        (raw.counter, raw.index, raw.has_gap) = (counted.counter, counted.index, counted.has_gap);
         let ssi = self.ssi.read(self.settings.ssi_bits);
-        let ssi = ssi.map(|word| SsiFrame { bits: word.bits, clocks: word.clocks });
-        RawEncoder { counter, index, ssi, has_gap, board: self.board }
+        raw.ssi = ssi.map(|word| SsiFrame { bits: word.bits, clocks: word.clocks });
     }
 }

@@ -6,8 +6,8 @@ use bsp::{Alarm, Clock, Frames, Lamps, Received, Ring};
 use canopen::{Duration, Instant, Next};
 use rtic::Mutex;
 
+use crate::exchange::Exchange;
 use crate::shared::Shared;
-use crate::snapshot_slot::SnapshotSlot;
 use crate::{SAMPLING, SERVICES};
 
 /// The data that the task owns.
@@ -40,14 +40,14 @@ impl Process {
     }
 
     /// Does everything that is due, and sets the alarm for the next deadline.
-    pub(crate) fn run(&mut self, snapshot: &mut impl Mutex<T = SnapshotSlot>, node: &mut impl Shared) {
+    pub(crate) fn run(&mut self, exchange: &mut impl Mutex<T = Exchange>, node: &mut impl Shared) {
         while let Some(Received { frame, at }) = self.frames.dequeue() {
             let next = node.call(|protocol, out| protocol.on_process_frame(&frame, at, out));
             self.follow(next, at);
         }
         let now = Clock::now();
         let (has_sampled, next, outputs) = node.call(|protocol, out| {
-            let is_new = snapshot.lock(|slot| slot.take(protocol.snapshot_mut()));
+            let is_new = exchange.lock(|exchange| exchange.take(protocol.snapshot_mut()));
             let next = if is_new { protocol.publish(now, out) } else { protocol.poll_process(now, out) };
             (is_new, next, protocol.outputs())
         });

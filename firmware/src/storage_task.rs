@@ -11,6 +11,7 @@ use profiles::board::RETAINED_WORDS;
 use update::{Clears, Event, Programs, Trial};
 
 use crate::SERVICES;
+use crate::exchange::Retained;
 use crate::shared::Shared;
 
 /// The longest erase of a page of 16 KiB (STM32F446 datasheet, flash memory programming).
@@ -32,9 +33,6 @@ pub(crate) struct StorageTask {
     /// The intervals for which the budget of clears was refilled.
     intervals: u8,
 }
-
-/// The words retained by the last sample; `None` if the profile retains nothing.
-pub(crate) type Retained = Option<[u32; RETAINED_WORDS]>;
 
 /// The retained words about positions. The others are the operating time.
 const POSITIONS: usize = RETAINED_WORDS - 2;

@@ -25,9 +25,9 @@ impl Progress {
     #[must_use]
     pub fn is_in_step(&self) -> bool {
         let converted = (ROUND * CHANNELS).saturating_sub(self.conversions_left);
-        let (ended, is_under_way) = (converted / CHANNELS, !converted.is_multiple_of(CHANNELS));
-        // A scan that has no conversion yet has begun if the period has just begun.
-        let begun = ended + usize::from(is_under_way || !self.second_half);
+        // A scan has begun with its first conversion, and without one if the period has just begun.
+        let ahead = if self.second_half { CHANNELS - 1 } else { CHANNELS };
+        let begun = (converted + ahead) / CHANNELS;
         ROUND.saturating_sub(self.copies_left) % ROUND == begun % ROUND
     }
 }

@@ -11,7 +11,7 @@ pub const RETAINED_WORDS: usize = 10;
 pub const POSITION_RECORD_WORDS: usize = 2;
 
 /// All readings of one millisecond.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Inputs {
     /// Analogue inputs.
     pub analogue: RawSample,
@@ -29,7 +29,7 @@ pub struct Outputs {
 }
 
 /// Sums of `count` conversions of 12 bits each, taken in the same millisecond.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RawSample {
     /// Output of the pressure transducer.
     pub pressure: u32,

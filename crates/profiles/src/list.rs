@@ -179,6 +179,15 @@ macro_rules! personalities {
         }
 
         impl Snapshot {
+            /// Begins as that of a personality, before its first sample.
+            #[cold]
+            #[inline(never)]
+            fn begin(&mut self, personality: Personality) {
+                *self = match personality {
+                    $(Personality::$Name => Snapshot::$Name(Default::default()),)+
+                };
+            }
+
             /// Calls `each` with every fault that the profile detects, always in the same order, and whether the values
             /// show the fault.
             pub fn faults(&self, each: &mut impl FnMut(&'static $crate::fault::Fault, bool)) {
@@ -243,7 +252,7 @@ macro_rules! personalities {
                     _ if !self.has_parameters => {}
                     $(AnyChain::$Name(chain) => {
                         if !matches!(snapshot, Snapshot::$Name(_)) {
-                            *snapshot = Snapshot::$Name(Default::default());
+                            snapshot.begin(Personality::$Name);
                         }
                         if let Snapshot::$Name(own) = snapshot {
                             $crate::profile::Chain::update(chain, inputs, own);

@@ -8,8 +8,8 @@ use crate::support::{Master, SECOND, world, write};
 
 /// DMA2 stream 0: the sampling task.
 const SAMPLING: Exception = Exception::irq(56);
-/// 2.2 % of a millisecond at 144 MHz.
-const BUDGET: u64 = 144_000 * 22 / 1000;
+/// 2.1 % of a millisecond at 144 MHz: the goal of 2 %, and what another version of the compiler may add.
+const BUDGET: u64 = 144_000 * 21 / 1000;
 /// Cycles of exception entry and exit, which the activity counters do not include.
 const AROUND: u64 = 24;
 
@@ -79,7 +79,7 @@ fn measure(estimate: Estimate) -> Samples {
 }
 
 #[test]
-fn a_sample_of_both_profiles_takes_2_2_per_cent_of_the_core() {
+fn a_sample_of_both_profiles_takes_2_per_cent_of_the_core() {
     let [best, modelled, worst] = [Estimate::Best, Estimate::Modelled, Estimate::Worst].map(measure);
     assert!(modelled.cycles <= BUDGET, "{} cycles of {BUDGET}", modelled.cycles);
     // One sample in each revolution also checks the index.

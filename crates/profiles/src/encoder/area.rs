@@ -40,6 +40,7 @@ impl Default for Module {
 /// A limit of the manufacturer is reported as soon as the position reaches it. The limits are signed and 6004h is not,
 /// so both are compared in 64 bits. A limit at either end of INTEGER32 counts as no limit.
 #[must_use]
+#[inline]
 pub fn area_state(area: &Area, module: &Module, position: u32, range: i64, native: i64) -> u8 {
     let position = i64::from(position);
     let position = if area.low < 0 { seen_from(*area, position, range) } else { position };

@@ -59,8 +59,10 @@ impl Window {
         Window { low: low as u32, length: length as u32 }
     }
 
-    fn contains(self, position: u32) -> bool {
-        position.wrapping_sub(self.low) <= self.length
+    /// 1 outside of the window, 0 inside: the borrow of the comparison, without a branch.
+    fn is_outside(self, position: u32) -> u32 {
+        let difference = u64::from(self.length).wrapping_sub(position.wrapping_sub(self.low).into());
+        u32::from(difference > u64::from(u32::MAX))
     }
 }
 
@@ -75,6 +77,8 @@ pub struct CamChannel {
     reachable: u8,
     /// For each cam: the window in which the cam becomes active, and the window in which it stays active.
     windows: [[Window; 2]; 8],
+    /// The one of its two windows that each cam has at present.
+    present: [Window; 8],
     active: u8,
 }
 
@@ -92,21 +96,32 @@ impl CamChannel {
             }
             self.reachable |= if i64::from(cam.low.min(cam.high)) < range { bit } else { 0 };
         }
+        self.activate(self.active);
     }
 
     /// The cam state register (6300h) at `position`. A disabled cam reads 0 whatever its polarity: 6301h says that its
     /// calculation is off and its state permanently 0. A disabled cam also forgets its state, so after enabling, the
     /// limits alone decide.
     pub fn update(&mut self, position: u32) -> u8 {
-        let mut active = 0;
-        for ([on, stay], bit) in self.windows.iter().zip(BITS) {
-            let window = if self.active & bit == 0 { on } else { stay };
-            active |= if window.contains(position) { bit } else { 0 };
-        }
+        let add = |bits, window: &Window| bits << 1 | window.is_outside(position);
+        let pairs = self.present.as_chunks::<2>().0.iter().rev();
+        let [outside, ..] = pairs.fold(0_u32, |bits, [low, high]| add(add(bits, high), low)).to_le_bytes();
         let [on, stay] = self.inverted;
         let inverted = (on & !self.active) | (stay & self.active);
-        self.active = (active ^ inverted) & self.enable & self.reachable;
+        let active = !(outside ^ inverted) & self.enable & self.reachable;
+        if active != self.active {
+            self.activate(active);
+        }
         (self.active ^ self.polarity) & self.enable
+    }
+
+    /// Takes over which cams are active, and with it their windows.
+    #[inline(never)]
+    fn activate(&mut self, active: u8) {
+        self.active = active;
+        for ((present, [on, stay]), bit) in self.present.iter_mut().zip(&self.windows).zip(BITS) {
+            *present = if active & bit == 0 { *on } else { *stay };
+        }
     }
 }
 

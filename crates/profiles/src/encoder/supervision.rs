@@ -147,7 +147,7 @@ impl Supervision {
     /// Object 6503h: present alarms, and past alarms that have not been acknowledged.
     pub(super) fn alarms(&mut self, channels: &[ChannelValues; 2]) -> u16 {
         let position = sensors(channels) & SENSOR_POSITION_ERROR != 0;
-        let commissioning = channels.iter().any(|channel| channel.commissioning.is_failure());
+        let commissioning = either(channels, |channel| channel.commissioning.is_failure());
         self.alarms |= flag(position, ALARM_POSITION) | flag(commissioning, ALARM_COMMISSIONING);
         self.alarms
     }
@@ -162,12 +162,13 @@ impl Supervision {
     ) -> u16 {
         let sensors = sensors(channels);
         let battery = board.battery.is_some_and(|voltage| voltage < limits.lowest_battery);
+        let is_limited = |channel: &ChannelValues| matches!(channel.speed, i16::MIN | i16::MAX);
         flag(sensors & SENSOR_TOO_FAST != 0, WARNING_FREQUENCY)
             | flag(board.watchdog_reset, WARNING_WATCHDOG)
             | flag(self.is_too_old(limits, time), WARNING_OPERATING_TIME)
             | flag(self.battery.update(battery), WARNING_BATTERY)
             | flag(sensors & SENSOR_UNREFERENCED != 0, WARNING_REFERENCE)
-            | flag(channels.iter().any(|channel| matches!(channel.speed, i16::MIN | i16::MAX)), WARNING_SPEED)
+            | flag(either(channels, is_limited), WARNING_SPEED)
     }
 
     pub(super) fn conditions(
@@ -206,6 +207,12 @@ fn errors(channels: &[ChannelValues; 2]) -> (bool, bool) {
     let is_wrong =
         |channel: &ChannelValues| !channel.is_broken && channel.sensor_state & SENSOR_POSITION_ERROR != 0;
     (channels.iter().any(|channel| channel.is_broken), channels.iter().any(is_wrong))
+}
+
+/// Whether one of the channels is in this condition; computed without branches.
+fn either(channels: &[ChannelValues; 2], is: impl Fn(&ChannelValues) -> bool) -> bool {
+    let [first, second] = channels;
+    is(first) | is(second)
 }
 
 fn sensors(channels: &[ChannelValues; 2]) -> u8 {

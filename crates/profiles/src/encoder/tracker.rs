@@ -69,10 +69,14 @@ impl Tracker {
     }
 
     /// Takes a reading after a movement by `moved` steps, which may be longer than half of the counter's range.
+    #[inline]
     pub(super) fn advance(&mut self, word: u32, moved: i32) {
         self.word = word;
         self.count = self.count.wrapping_add_signed(moved);
-        self.correct(moved.into());
+        match self.shaft.step.checked_add_signed(moved) {
+            Some(step) if step < self.turn.get() => self.shaft.step = step,
+            _ => self.correct(moved.into()),
+        }
     }
 
     /// Corrects the position without a movement.

@@ -71,6 +71,8 @@ impl Chain for Lift {
         self.devices = parameters.devices;
     }
 
+    // Not inlined: its caller would need the room of these values for every personality.
+    #[inline(never)]
     fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
         *snapshot = Snapshot {
             position: self.position.sample(&inputs.position),

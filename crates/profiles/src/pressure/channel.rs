@@ -137,11 +137,13 @@ impl Channel {
         // In single precision on purpose: the nearest single to 0.29 times 100 is 29, while the same product in double
         // precision is 28.999999 and would be cut to 28.
         let shifted = process_value * self.shift;
-        let (process_value16, process_value32) = (truncate16(shifted), truncate32(shifted));
+        let process_value32 = truncated(shifted);
+        let process_value16 = clipped(process_value32);
+        let is_exact = !shifted.is_nan() && i32::from(process_value16) == process_value32;
         let spans = p.span.status(process_value)
             | p.span16.status(process_value16)
             | p.span32.status(process_value32);
-        let status = spans | if valid && fits16(shifted) { 0 } else { STATUS_INVALID };
+        let status = spans | if valid && is_exact { 0 } else { STATUS_INVALID };
         ChannelValues {
             field_value,
             process_value,
@@ -165,18 +167,14 @@ fn finite(value: f32) -> f32 {
 
 /// Rounds towards zero. A value out of range gives the nearest limit, and NaN gives 0, as defined for `as`.
 #[allow(clippy::cast_possible_truncation)]
-fn truncate16(value: f32) -> i16 {
-    value as i16
-}
-
-#[allow(clippy::cast_possible_truncation)]
-fn truncate32(value: f32) -> i32 {
+fn truncated(value: f32) -> i32 {
     value as i32
 }
 
-/// Whether no integer format is clipped: a value that fits 16 bits also fits 32. False for NaN.
-fn fits16(value: f32) -> bool {
-    value > f32::from(i16::MIN) - 1.0 && value < f32::from(i16::MAX) + 1.0
+/// The same number in 16 bits. A number out of range gives the nearest limit.
+#[allow(clippy::cast_possible_truncation)]
+fn clipped(value: i32) -> i16 {
+    value.clamp(i16::MIN.into(), i16::MAX.into()) as i16
 }
 
 /// Ten to the power of `digits`. Beyond the 38 digits of single precision, no value fits any format.
