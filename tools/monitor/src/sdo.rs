@@ -81,11 +81,13 @@ pub(crate) struct Channel {
     since: Instant,
     /// Answers to requests before that may still be on their way: the client did not wait for them.
     crossing: u16,
+    /// The server has aborted a block download within a block. The next segment of the block that may still be on its way.
+    stray: Option<u8>,
 }
 
 impl Channel {
     pub(crate) fn new() -> Channel {
-        Channel { transfer: None, expect: Expect::Anything, since: Instant(0), crossing: 0 }
+        Channel { transfer: None, expect: Expect::Anything, since: Instant(0), crossing: 0, stray: None }
     }
 
     /// The server has restarted: there is no transfer.
@@ -126,6 +128,9 @@ impl Channel {
             self.crossing = 0;
         }
         self.since = now;
+        if self.is_stray(data[0]) {
+            return None;
+        }
         if self.is_within_block_download() && data[0] != 0x80 {
             self.take_segment(data);
             return None;
@@ -143,6 +148,13 @@ impl Channel {
                 None
             }
         }
+    }
+
+    /// Whether a frame is a segment of a block that the server has aborted. No answer to it is due.
+    fn is_stray(&mut self, command: u8) -> bool {
+        let next = self.stray.take().filter(|next| *next == command & 0x7F);
+        self.stray = next.map(|next| next + 1).filter(|_| command & 0x80 == 0);
+        next.is_some()
     }
 
     fn is_within_block_download(&self) -> bool {
@@ -288,6 +300,8 @@ impl Channel {
             }
             return None;
         };
+        let within_block = transfer.mode == Mode::Block && self.expect == Expect::Nothing;
+        self.stray = (within_block && transfer.is_download).then_some(transfer.block.len() as u8 + 1);
         self.expect = Expect::Nothing;
         transfer.is_download.then_some(Event::Aborted(transfer.key, transfer.data))
     }

@@ -21,11 +21,14 @@ pub(super) struct Receiver {
     /// The last segment of the transfer, once it has arrived. The end of the transfer tells how many of its bytes are
     /// data.
     last: Option<[u8; 7]>,
+    /// The error of a segment. The end of the block reports it: the client sends the whole block before it listens, and
+    /// no segment that is still on its way may be taken for a request.
+    verdict: Result<(), Abort>,
 }
 
 impl Receiver {
     pub(super) fn new(sink: Sink, check_crc: bool) -> Receiver {
-        Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None }
+        Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None, verdict: Ok(()) }
     }
 
     pub(super) fn sink(&self) -> &Sink {
@@ -61,13 +64,31 @@ impl Receiver {
         segment: BlockSegment,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
-    ) -> Result<bool, Abort> {
+    ) -> bool {
         self.has_begun = true;
         let is_in_a_row = self.next_then == self.next;
         if self.newest.replace(segment) == Some(segment) && is_in_a_row {
-            return Ok(false);
+            return false;
         }
         let is_end = segment.last || segment.sequence == BlockSize::MAX;
+        if self.verdict.is_ok() {
+            self.verdict = self.store(segment, is_end, buffer, objects);
+            // `take_next` may take the following segments, except for the last segment of the block.
+            let direct = if self.verdict.is_ok() { BlockSize::MAX.get().saturating_sub(self.next) } else { 0 };
+            self.sink.allow_direct(direct.into());
+        }
+        self.next_then = self.next;
+        is_end
+    }
+
+    /// Stores the data of a segment.
+    fn store(
+        &mut self,
+        segment: BlockSegment,
+        is_end: bool,
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
         if segment.sequence.get() == self.next {
             self.next += 1;
             if segment.last {
@@ -76,22 +97,16 @@ impl Receiver {
                 self.sink.append(&segment.data, buffer, objects)?;
             }
         }
-        if is_end {
-            self.sink.hand_over(buffer, objects)?;
-        } else {
-            // `take_next` may take the following segments, except for the last segment of the block.
-            self.sink.allow_direct(BlockSize::MAX.get().saturating_sub(self.next).into());
-        }
-        self.next_then = self.next;
-        Ok(is_end)
+        if is_end { self.sink.hand_over(buffer, objects) } else { Ok(()) }
     }
 
-    /// Begins the next block. Returns the sequence number to acknowledge.
-    pub(super) fn acknowledge(&mut self) -> u8 {
+    /// Begins the next block. Returns the sequence number to acknowledge, or the error of a segment of this block.
+    pub(super) fn acknowledge(&mut self) -> Result<u8, Abort> {
+        self.verdict?;
         self.has_begun = false;
         self.next_then = 1;
         self.sink.allow_direct(0);
-        core::mem::replace(&mut self.next, 1) - 1
+        Ok(core::mem::replace(&mut self.next, 1) - 1)
     }
 
     /// Completes the transfer.

@@ -227,14 +227,17 @@ impl<O: Objects> Server<O> {
         if now < self.deadline() {
             return false;
         }
-        match &mut self.transfer {
+        let acknowledged = match &mut self.transfer {
             Transfer::BlockDownload(receiver)
                 if O::BLOCK_DOWNLOAD && receiver.is_within_block() && now < self.active.plus(TIME_OUT) =>
             {
-                let sequence = receiver.acknowledge();
-                self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX))
+                receiver.acknowledge()
             }
-            _ => self.settle(Err(Abort::TimeOut), objects, now),
+            _ => Err(Abort::TimeOut),
+        };
+        match acknowledged {
+            Ok(sequence) => self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)),
+            Err(abort) => self.settle(Err(abort), objects, now),
         }
     }
 

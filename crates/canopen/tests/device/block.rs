@@ -34,6 +34,11 @@ fn segment(data: &[u8], number: usize, sequence: u8) -> BlockSegment {
     BlockSegment { last, sequence: BlockSize::new(sequence).unwrap(), data: bytes }
 }
 
+/// A segment that is not the last one.
+fn middle(data: [u8; 7], sequence: u8) -> BlockSegment {
+    BlockSegment { last: false, sequence: BlockSize::new(sequence).unwrap(), data }
+}
+
 /// Fate of a frame on the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
@@ -249,19 +254,37 @@ fn too_many_bytes_are_refused_when_they_arrive() {
     assert_eq!(client.bench.ask(request), Some(Response::Abort(TEXT, 0x0607_0012)));
 }
 
+/// The client sends the whole block before it listens. The server refuses the data at the end of the block: until then,
+/// every frame is a segment, and none is a request, whatever its number and its data look like.
 #[test]
-fn segments_beyond_the_announced_size_are_refused_when_they_come() {
-    for segments in [1, 2, 15, 16, 17, 120] {
+fn a_refused_segment_is_answered_at_the_end_of_its_block() {
+    for accepted in 0..=125_u8 {
         let mut client = Client::new();
         // The next segment has a byte too many.
-        let size = u32::from(segments) * 7 + 6;
+        let size = u32::from(accepted) * 7 + 6;
         client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(size) });
-        for sequence in 1..=segments {
-            assert_eq!(client.send_segment(segment(&data(2000), sequence.into(), sequence)), None);
+        // Segment 2Bh looks like the download of a value, segments 40h to 5Fh like the upload.
+        let content = [0x00, 0x61, 0x00, 0x03, 0x00, 0x00, 0x00];
+        for sequence in 1..=126 {
+            assert_eq!(client.send_segment(middle(content, sequence)), None, "after {accepted}");
         }
-        let refused = client.send_segment(segment(&data(2000), segments.into(), segments + 1));
-        assert_eq!(refused, Some(Response::Abort(DOMAIN, 0x0607_0012)), "after {segments}");
+        let refused = client.send_segment(middle(content, 127));
+        assert_eq!(refused, Some(Response::Abort(DOMAIN, 0x0607_0012)), "after {accepted}");
+        assert_eq!(client.bench.device.application().downloads, 0);
+        assert_eq!(client.bench.read(0x6100, 0), Ok(vec![0, 0]), "after {accepted}");
     }
+}
+
+/// A client that ends a refused block early gets the abort message after the pause.
+#[test]
+fn a_refused_block_without_its_end_is_aborted_after_the_pause() {
+    let mut client = Client::new();
+    client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(13) });
+    for sequence in 1..=3 {
+        assert_eq!(client.send_segment(middle([0; 7], sequence)), None);
+    }
+    assert_eq!(client.wait(), Some(Response::Abort(DOMAIN, 0x0607_0012)));
+    assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]));
 }
 
 #[test]

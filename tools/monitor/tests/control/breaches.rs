@@ -249,6 +249,9 @@ fn protocol() -> Vec<Seeded> {
         shown("the CRC of an upload is wrong", Rule::SdoProtocol, |trace| {
             set(trace, RESPONSE, 0xD1, 1, 0);
         }),
+        shown("a segment of an aborted block is taken for a request", Rule::SdoProtocol, |trace| {
+            trace.at(LATE).refused_block(&[0x4F, 1, 0x10, 0, 0, 0, 0, 0]);
+        }),
         shown("a segment of a block is left out", Rule::SdoProtocol, |trace| {
             set(trace, RESPONSE, 0x82, 0, 0x83);
         }),

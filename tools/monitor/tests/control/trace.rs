@@ -111,6 +111,7 @@ impl Trace {
         self.read(0x6003, 0, &1234_u32.to_le_bytes());
         self.segments();
         self.blocks();
+        self.refused_block(&[]);
         self.read(0x6003, 0, &1234_u32.to_le_bytes());
         self.write(0x1010, 1, b"save");
         self.events.push(Event::Deadline(Instant(self.now), 0, Instant(self.now + 1)));
@@ -140,6 +141,18 @@ impl Trace {
         self.answer(&b);
         self.ask(&[0xA2, 2, 127, 0, 0, 0, 0, 0], &[0xC1 | 4 << 2, low, high, 0, 0, 0, 0, 0]);
         self.ask(&[0xA1, 0, 0, 0, 0, 0, 0, 0], &[]);
+    }
+
+    /// A block download that node 5 aborts within the block. Two more segments were on their way; the second one looks like
+    /// an upload of 1001h, and has this answer.
+    pub(crate) fn refused_block(&mut self, answer: &[u8]) {
+        self.ask(&[0xC4, 0x00, 0x2F, 0, 0, 0, 0, 0], &[0xA4, 0x00, 0x2F, 0, 127, 0, 0, 0]);
+        for sequence in 0x01..0x3F {
+            self.ask(&[sequence, 1, 2, 3, 4, 5, 6, 7], &[]);
+        }
+        self.ask(&[0x3F, 1, 2, 3, 4, 5, 6, 7], &[0x80, 0x00, 0x2F, 0, 0, 0, 6, 6]);
+        self.ask(&[0x40, 1, 0x10, 0, 0, 0, 0, 0], answer);
+        self.ask(&[0x41, 1, 0x10, 0, 0, 0, 0, 0], &[]);
     }
 
     /// SYNC every 20 ms, and two events of TPDO 2.

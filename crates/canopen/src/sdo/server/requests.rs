@@ -196,10 +196,10 @@ impl<O: Objects> Server<O> {
 
     pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut O) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
-        if !receiver.take(segment, &mut self.buffer, objects)? {
+        if !receiver.take(segment, &mut self.buffer, objects) {
             return Ok(false);
         }
-        let sequence = receiver.acknowledge();
+        let sequence = receiver.acknowledge()?;
         Ok(self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
