@@ -19,7 +19,12 @@ pub struct Exchange {
 impl Exchange {
     /// With the parameters for the first sample.
     pub(crate) fn new(parameters: Parameters) -> Exchange {
-        Exchange { parameters: Some(parameters), retained: None, snapshot: Snapshot::default(), is_new: false }
+        Exchange {
+            parameters: Some(parameters),
+            retained: None,
+            snapshot: Snapshot::default(),
+            is_new: false,
+        }
     }
 
     /// The place for the next snapshot. The snapshot is written in its place and copied once: a thousand times a second,

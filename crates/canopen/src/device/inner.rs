@@ -8,7 +8,7 @@ use crate::array::Array;
 use crate::dictionary::{Dictionary, Entry, Field, Group, Services, little_endian};
 use crate::emcy::Fault;
 use crate::nmt::State;
-use crate::pdo::{Choices, Links, ProcessContext, Rpdo, Scanner, Tpdo};
+use crate::pdo::{Choices, Links, ProcessContext, Rpdo, Scanner};
 use crate::transmit::Context;
 use crate::{CanId, NodeId, Span, Tick, Transmit, emcy, heartbeat, sync, time_stamp};
 
@@ -80,8 +80,8 @@ impl<D: Definition> Inner<D> {
             sync_producer: sync::Producer::new(),
             time_stamp: time_stamp::Service::new(),
             emcy,
-            tpdos: D::Tpdos::filled(Tpdo::new),
-            rpdos: D::Rpdos::filled(Rpdo::new),
+            tpdos: D::Tpdos::NEW,
+            rpdos: D::Rpdos::NEW,
             rpdo_filter: 0,
             scanner: Scanner::new(),
             all_nodes: None,
@@ -91,7 +91,7 @@ impl<D: Definition> Inner<D> {
             jobs: store::Jobs::new(),
             damage: store::Damage::NONE,
             is_bus_off: false,
-            image: D::Image::filled(|| 0),
+            image: D::Image::NEW,
         }
     }
 
@@ -167,6 +167,7 @@ impl<D: Definition> Inner<D> {
         self.dictionary.default_number(entry, self.node_id)
     }
 
+    #[inline(never)]
     pub(super) fn word(&self, field: Field) -> u32 {
         little_endian(field.get(self.image.as_ref()))
     }

@@ -36,7 +36,7 @@ impl<D: Definition> Services<D> {
         Services {
             sdo: Channel::new(),
             sdo_request: sdo_request(node_id),
-            more_sdo: D::Servers::filled(Channel::new),
+            more_sdo: D::Servers::NEW,
             lss: LssSlave::new(node_id),
             budget: Budget::new(BitRate::FASTEST.kbit()),
         }

@@ -39,11 +39,10 @@ impl Field {
         }
         let start = usize::from(self.offset);
         let Some(place) = image.get_mut(start..start + usize::from(self.size)) else { return };
-        let (value, rest) = place.split_at_mut(bytes.len().min(place.len()));
-        for (to, from) in value.iter_mut().zip(bytes) {
-            *to = *from;
+        let mut rest = bytes.iter();
+        for to in place {
+            *to = rest.next().copied().unwrap_or(0);
         }
-        rest.fill(0);
     }
 
     /// Whether the value takes this place of the image.

@@ -48,7 +48,11 @@ impl Group {
             Group::Communication => 2,
             Group::Application => 3,
             Group::Calibration => 0,
-            own => own as u8 + 1,
+            Group::Own4 => 4,
+            Group::Own5 => 5,
+            Group::Own6 => 6,
+            Group::Own7 => 7,
+            Group::Own8 => 8,
         }
     }
 
@@ -84,7 +88,11 @@ impl Groups {
             1 => Some(Groups::ALL_PARAMETERS),
             2 => Some(Groups::one(Group::Communication)),
             3 => Some(Groups::one(Group::Application)),
-            4..=8 => Some(Groups(1 << (sub - 1))),
+            4 => Some(Groups::one(Group::Own4)),
+            5 => Some(Groups::one(Group::Own5)),
+            6 => Some(Groups::one(Group::Own6)),
+            7 => Some(Groups::one(Group::Own7)),
+            8 => Some(Groups::one(Group::Own8)),
             _ => None,
         }
     }

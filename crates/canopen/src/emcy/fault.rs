@@ -140,22 +140,22 @@ impl Fault {
             return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
         }
         let [low, high] = self.detail().to_le_bytes();
-        let (register, class) = match self {
-            Fault::StoredData(_) | Fault::OlderData(_) => (0, Some(ErrorClass::DEVICE)),
-            Fault::Heartbeat(_) | Fault::LifeGuard => (COMMUNICATION, Some(ErrorClass::COMMUNICATION)),
-            _ => (COMMUNICATION, None),
-        };
+        let class = self.class();
+        let register = if class == Some(ErrorClass::DEVICE) { 0 } else { COMMUNICATION };
         Condition { code: self.code(), register, detail: [low, high, 0, 0, 0], class }
     }
 
+    const fn class(self) -> Option<ErrorClass> {
+        match self {
+            Fault::StoredData(_) | Fault::OlderData(_) => Some(ErrorClass::DEVICE),
+            Fault::Heartbeat(_) | Fault::LifeGuard => Some(ErrorClass::COMMUNICATION),
+            _ => None,
+        }
+    }
+
     /// The emergency error code of a fault that is not one of the application.
-    fn code(self) -> u16 {
-        let sub = match self {
-            Fault::StoredData(group) | Fault::OlderData(group) => group.sub(),
-            _ => 0,
-        };
-        // Constants only: the compiler makes a table of them.
-        let code = match self {
+    const fn code(self) -> u16 {
+        match self {
             Fault::Overrun => 0x8110,
             Fault::ErrorPassive => 0x8120,
             Fault::BusOffRecovered => 0x8140,
@@ -166,10 +166,9 @@ impl Fault {
             Fault::RpdoTooShort(_) => 0x8210,
             Fault::RpdoTooLong(_) => 0x8220,
             Fault::RpdoDeadline(_) => 0x8250,
-            Fault::StoredData(_) | Fault::OlderData(_) => 0x6300,
+            Fault::StoredData(group) | Fault::OlderData(group) => 0x6300 | group.sub() as u16,
             Fault::Application(_) => 0x1000,
-        };
-        code | u16::from(sub)
+        }
     }
 
     /// The start of the error field: the sub-index of a heartbeat, the number of an RPDO; for stored data, the values

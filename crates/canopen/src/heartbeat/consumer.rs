@@ -1,6 +1,6 @@
 //! The heartbeat consumer (CiA 301, 7.2.8.2.2.2): monitors the heartbeats of other nodes.
 
-use crate::array::Array;
+use crate::array::{Array, Element};
 use crate::nmt::State;
 use crate::{CanId, Frame, NodeId, Span, Tick};
 
@@ -52,6 +52,10 @@ impl Monitored {
     }
 }
 
+impl Element for Monitored {
+    const NEW: Monitored = Monitored::new(None);
+}
+
 /// Monitors nodes, as many as `E` has elements. The monitoring of a node begins with its first heartbeat.
 #[derive(Debug)]
 pub(crate) struct Consumer<E> {
@@ -60,7 +64,7 @@ pub(crate) struct Consumer<E> {
 
 impl<E: Array<Monitored>> Consumer<E> {
     pub(crate) fn new() -> Consumer<E> {
-        Consumer { entries: E::filled(|| Monitored::new(None)) }
+        Consumer { entries: E::NEW }
     }
 
     /// The epoch of the clock has moved.

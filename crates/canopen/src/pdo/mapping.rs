@@ -169,6 +169,8 @@ pub(crate) struct Links {
 impl Links {
     /// The position after the last PDO of a chain: no PDO has this position.
     const NOWHERE: u16 = u16::MAX;
+    /// In no chain.
+    pub(crate) const NONE: Links = Links { valid: 0, synchronous: 0 };
     /// The end of both chains.
     pub(crate) const END: Links = Links { valid: Links::NOWHERE, synchronous: Links::NOWHERE };
 

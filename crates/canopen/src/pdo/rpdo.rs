@@ -4,6 +4,7 @@
 //! frame must arrive before the timer elapses.
 
 use super::{Content, Layout, Links};
+use crate::array::Element;
 use crate::dictionary::{Addressing, Transmission};
 use crate::emcy::Fault;
 use crate::{CanId, Frame, Span, Tick};
@@ -92,19 +93,20 @@ pub struct Rpdo {
     faults: u8,
 }
 
-impl Rpdo {
-    pub(crate) const fn new() -> Rpdo {
-        Rpdo {
-            links: Links::END,
-            index: 0,
-            is_valid: false,
-            settings: RpdoSettings::UNUSED,
-            waiting: None,
-            due: Tick::NEVER,
-            faults: 0,
-        }
-    }
+impl Element for Rpdo {
+    const NEW: Rpdo = Rpdo {
+        // Set for all PDOs when the chains are made.
+        links: Links::NONE,
+        index: 0,
+        is_valid: false,
+        settings: RpdoSettings::UNUSED,
+        waiting: None,
+        due: Tick::NEVER,
+        faults: 0,
+    };
+}
 
+impl Rpdo {
     /// The epoch of the clock has moved.
     pub(crate) fn shift(&mut self, by: Span) {
         self.due.shift(by);

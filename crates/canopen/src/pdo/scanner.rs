@@ -6,8 +6,8 @@
 //! sends all objects in both cases.
 
 use super::{Address, Choices, Layout, Mpdo, ProcessContext};
-use crate::array::Array;
-use crate::dictionary::{Addressing, Field};
+use crate::array::{Array, Element};
+use crate::dictionary::{Addressing, Field, little_endian};
 use crate::sdo::Multiplexer;
 use crate::transmit::RETRY;
 use crate::{CanId, Frame, NodeId, Span, Tick, Transmit};
@@ -47,25 +47,23 @@ pub struct Watched {
     is_pending: bool,
 }
 
-impl Watched {
-    const UNUSED: Watched = Watched {
+impl Element for Watched {
+    const NEW: Watched = Watched {
         at: Multiplexer { index: 0, sub: 0 },
         field: Field { offset: 0, size: 0 },
         sent: None,
         is_selected: false,
         is_pending: false,
     };
+}
 
+impl Watched {
     pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
         Watched { at, field, sent: None, is_selected: true, is_pending: false }
     }
 
     fn value(&self, image: &[u8]) -> [u8; 4] {
-        let mut data = [0; 4];
-        for (to, from) in data.iter_mut().zip(self.field.get(image)) {
-            *to = *from;
-        }
-        data
+        little_endian(self.field.get(image)).to_le_bytes()
     }
 }
 
@@ -106,7 +104,7 @@ impl<L: Array<Watched>> Scanner<L> {
     pub(crate) fn new() -> Scanner<L> {
         Scanner {
             settings: None,
-            watched: List { memory: L::filled(|| Watched::UNUSED), len: 0 },
+            watched: List { memory: L::NEW, len: 0 },
             is_pending: false,
             event_due: Tick::NEVER,
             sent: Tick::NEVER,

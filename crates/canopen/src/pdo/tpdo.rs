@@ -8,6 +8,7 @@
 //! inhibit time and the event timer determine when the application is asked for its waiting events.
 
 use super::{Choices, Layout, Links, ProcessContext};
+use crate::array::Element;
 use crate::dictionary::Transmission;
 use crate::sync::Sync;
 use crate::transmit::RETRY;
@@ -36,7 +37,7 @@ impl Settings {
     const UNUSED: Settings = Settings {
         id: CanId::NMT,
         answers_remote: false,
-        transmission: Transmission::Timer,
+        transmission: Transmission::SyncAcyclic,
         inhibit: 0,
         event: 0,
         sync_start: 0,
@@ -101,23 +102,24 @@ impl Events {
     const BEGIN: Events = Events { may_wait: true, is_open: true, is_silent: false };
 }
 
-impl Tpdo {
-    pub(crate) const fn new() -> Tpdo {
-        Tpdo {
-            links: Links::END,
-            is_valid: false,
-            settings: Settings::UNUSED,
-            pending: false,
-            syncs: 0,
-            is_counting: false,
-            data: None,
-            event_due: Tick::NEVER,
-            sent: Tick::NEVER,
-            inhibited_until: Tick::NEVER,
-            events: Events::NONE,
-        }
-    }
+impl Element for Tpdo {
+    const NEW: Tpdo = Tpdo {
+        // Set for all PDOs when the chains are made.
+        links: Links::NONE,
+        is_valid: false,
+        settings: Settings::UNUSED,
+        pending: false,
+        syncs: 0,
+        is_counting: false,
+        data: None,
+        event_due: Tick::NEVER,
+        sent: Tick::NEVER,
+        inhibited_until: Tick::NEVER,
+        events: Events::NONE,
+    };
+}
 
+impl Tpdo {
     /// The epoch of the clock has moved.
     pub(crate) fn shift(&mut self, by: Span) {
         self.event_due.shift(by);

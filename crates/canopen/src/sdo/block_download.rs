@@ -28,7 +28,16 @@ pub(super) struct Receiver {
 
 impl Receiver {
     pub(super) fn new(sink: Sink, check_crc: bool) -> Receiver {
-        Receiver { sink, check_crc, next: 1, newest: None, next_then: 1, has_begun: false, last: None, verdict: Ok(()) }
+        Receiver {
+            sink,
+            check_crc,
+            next: 1,
+            newest: None,
+            next_then: 1,
+            has_begun: false,
+            last: None,
+            verdict: Ok(()),
+        }
     }
 
     pub(super) fn sink(&self) -> &Sink {
@@ -74,7 +83,8 @@ impl Receiver {
         if self.verdict.is_ok() {
             self.verdict = self.store(segment, is_end, buffer, objects);
             // `take_next` may take the following segments, except for the last segment of the block.
-            let direct = if self.verdict.is_ok() { BlockSize::MAX.get().saturating_sub(self.next) } else { 0 };
+            let direct =
+                if self.verdict.is_ok() { BlockSize::MAX.get().saturating_sub(self.next) } else { 0 };
             self.sink.allow_direct(direct.into());
         }
         self.next_then = self.next;

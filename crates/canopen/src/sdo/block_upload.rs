@@ -124,8 +124,8 @@ impl Sender {
         }
     }
 
-    /// Takes the acknowledgement of a block up to a segment, with the size of the next block. Returns the end of the
-    /// transfer when the client has all data.
+    /// Takes the acknowledgement of a block up to a segment, with the size of the next block. Returns whether
+    /// the client has all data, so that the end of the transfer follows.
     ///
     /// An acknowledgement that arrives while the block is still being sent, or that names a later segment, may be a
     /// repetition of the one before and is then ignored. A repetition of the final acknowledgement is answered again.
@@ -134,13 +134,13 @@ impl Sender {
         sequence: u8,
         block_size: u8,
         is_repeated: bool,
-    ) -> Result<Option<BlockEnd>, Abort> {
+    ) -> Result<bool, Abort> {
         match self.phase {
-            Phase::Sending => return Ok(None),
-            Phase::Waiting if sequence > self.sequence && is_repeated => return Ok(None),
+            Phase::Sending => return Ok(false),
+            Phase::Waiting if sequence > self.sequence && is_repeated => return Ok(false),
             Phase::Waiting if sequence > self.sequence => return Err(Abort::Sequence),
             Phase::Waiting => (),
-            Phase::Ended if is_repeated => return Ok(Some(self.end())),
+            Phase::Ended if is_repeated => return Ok(true),
             Phase::Ready | Phase::Ended => return Err(Abort::Command),
         }
         self.block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
@@ -148,10 +148,11 @@ impl Sender {
         self.sequence = 0;
         let is_all = self.acknowledged >= self.source.len();
         self.phase = if is_all { Phase::Ended } else { Phase::Sending };
-        Ok(is_all.then(|| self.end()))
+        Ok(is_all)
     }
 
-    fn end(&self) -> BlockEnd {
+    /// The end of the transfer.
+    pub(super) fn end(&self) -> BlockEnd {
         BlockEnd::of(self.source.len(), self.crc)
     }
 

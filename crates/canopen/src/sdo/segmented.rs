@@ -1,9 +1,8 @@
 //! Segmented transfers (CiA 301, 7.2.4.3.4 and 7.2.4.3.7).
 
 use super::objects::{BUFFER, Sink, Source};
-use super::{Abort, Objects, TOGGLE};
+use super::{Abort, Bytes, Objects, TOGGLE};
 use crate::Tick;
-use crate::copy::copy;
 
 /// An upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -22,13 +21,14 @@ impl Upload {
         Upload { source, sent: 0, toggle: false }
     }
 
-    /// The frame of the next segment, and whether it is the last one.
+    /// Sets the frame of the next segment. Returns whether the segment is the last one.
     pub(super) fn next<O: Objects>(
         &mut self,
         requested: bool,
+        frame: &mut [u8; 8],
         buffer: &mut [u8; BUFFER],
         objects: &mut O,
-    ) -> Result<([u8; 8], bool), Abort> {
+    ) -> Result<bool, Abort> {
         if requested != self.toggle {
             return Err(Abort::Toggle);
         }
@@ -39,18 +39,19 @@ impl Upload {
         } else {
             self.source.content(buffer, objects)?.get(self.sent..).unwrap_or(&[])
         };
-        let mut frame = [0; 8];
-        let [command, data @ ..] = &mut frame;
+        let mut next = [0; 8];
+        let [command, data @ ..] = &mut next;
         let len = content.len().min(data.len());
         match content.first_chunk() {
             Some(full) => *data = *full,
-            None => copy(data, content),
+            None => *data = Bytes::from_slice(content).padded(),
         }
         self.sent += len;
         self.toggle = !requested;
         let is_last = self.sent == self.source.len();
         *command = if requested { TOGGLE } else { 0 } | in_segment(7 - len) << 1 | u8::from(is_last);
-        Ok((frame, is_last))
+        *frame = next;
+        Ok(is_last)
     }
 }
 

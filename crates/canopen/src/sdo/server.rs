@@ -8,6 +8,7 @@ use super::block_upload::Sender;
 use super::objects::BUFFER;
 use super::segmented::{Download, Upload};
 use super::{Abort, BlockSegment, BlockSize, Multiplexer, Objects, Response};
+use crate::array::Element;
 use crate::transmit::{Context, RETRY};
 use crate::{CanId, Frame, Span, Tick, Transmit};
 use core::marker::PhantomData;
@@ -55,7 +56,7 @@ impl<O: Objects> Server<O> {
             transfer: Transfer::Idle,
             multiplexer: Multiplexer { index: 0, sub: 0 },
             buffer: [0; BUFFER],
-            active: Tick::PAST,
+            active: Tick::NEVER,
             previous: [0; 8],
             is_answered: false,
             reply: [0; 8],
@@ -150,7 +151,7 @@ impl<O: Objects> Server<O> {
             Some(segment) => self.take_block_segment(segment, objects),
             None => self.dispatch(frame, is_repeated, objects, now),
         };
-        let has_reply = self.conclude(answer, objects, now);
+        let has_reply = self.settle(answer, objects, now);
         (self.previous, self.is_answered) = (*frame, has_reply);
         has_reply
     }
@@ -188,13 +189,15 @@ impl<O: Objects> Server<O> {
         true
     }
 
-    /// Ends the processing of a request. An error ends the transfer; the reply to a write that takes time is held back.
-    fn conclude(&mut self, answer: Answer, objects: &mut O, now: Tick) -> bool {
-        if answer == Ok(true) && objects.take_deferred() {
+    /// Ends a request that may have written. The reply to a write that takes time is held back. Returns whether there is a
+    /// reply now.
+    #[inline]
+    fn written(&mut self, objects: &mut O) -> bool {
+        let waits = objects.take_deferred();
+        if waits {
             self.transfer = Transfer::Deferred;
-            return self.settle(Ok(false), objects, now);
         }
-        self.settle(answer, objects, now)
+        !waits
     }
 
     /// Ends the transfer. The application learns of a domain whose transfer is not complete.
@@ -290,6 +293,10 @@ impl<O> core::fmt::Debug for Channel<O> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Channel").finish_non_exhaustive()
     }
+}
+
+impl<O: Objects> Element for Channel<O> {
+    const NEW: Channel<O> = Channel::new();
 }
 
 impl<O: Objects> Channel<O> {

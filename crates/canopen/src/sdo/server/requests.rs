@@ -76,10 +76,14 @@ impl<O: Objects> Server<O> {
                 self.transfer = Transfer::Idle;
                 Ok(false)
             }
-            2 => match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
-                Some(end) => Ok(self.set_reply(Response::BlockUploadEnd(end))),
-                None => Ok(false),
-            },
+            2 => {
+                let sender = self.sender()?;
+                if !sender.acknowledge(sequence, block_size, is_repeated)? {
+                    return Ok(false);
+                }
+                let end = sender.end();
+                Ok(self.set_reply(Response::BlockUploadEnd(end)))
+            }
             _ => self.sender()?.start(is_repeated).map(|()| false),
         }
     }
@@ -103,7 +107,10 @@ impl<O: Objects> Server<O> {
             None => self.download(at, frame, objects, now),
         };
         let answer = result.map(|()| self.set_reply(Response::Downloaded(at)));
-        self.conclude(answer, objects, now)
+        if answer == Ok(true) && !self.written(objects) {
+            return self.settle(Ok(false), objects, now);
+        }
+        self.settle(answer, objects, now)
     }
 
     /// Takes the request that begins an upload.
@@ -149,9 +156,7 @@ impl<O: Objects> Server<O> {
 
     fn upload_segment(&mut self, toggle: bool, objects: &mut O) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
-        let is_last;
-        (self.reply, is_last) = upload.next(toggle, &mut self.buffer, objects)?;
-        if is_last {
+        if upload.next(toggle, &mut self.reply, &mut self.buffer, objects)? {
             if O::PARTS {
                 upload.source().close(true, objects);
             }
@@ -181,10 +186,12 @@ impl<O: Objects> Server<O> {
 
     fn download_segment(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
         let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
-        if download.take(frame, &mut self.buffer, objects, now)? {
+        let is_complete = download.take(frame, &mut self.buffer, objects, now)?;
+        if is_complete {
             self.transfer = Transfer::Idle;
         }
-        Ok(self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 }))
+        self.set_reply(Response::DownloadedSegment { toggle: frame[0] & TOGGLE != 0 });
+        Ok(!is_complete || self.written(objects))
     }
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
@@ -207,7 +214,8 @@ impl<O: Objects> Server<O> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         receiver.end(end, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
-        Ok(self.set_reply(Response::BlockDownloaded))
+        self.set_reply(Response::BlockDownloaded);
+        Ok(self.written(objects))
     }
 
     /// Begins a block upload. A value of at most `threshold` bytes is sent as an ordinary upload.
