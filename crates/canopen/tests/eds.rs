@@ -48,7 +48,8 @@ fn every_entry_has_its_own_name() {
     for (name, expected) in [
         ("1000", "Device type"),
         ("1018", "Identity"),
-        ("1018sub0", "Number of entries"),
+        ("1018sub0", "Highest sub-index supported"),
+        ("1003sub0", "Number of entries"),
         ("1018sub2", "Product code"),
         ("2001sub1", "Gain"),
         ("6000sub1", "Input 1"),
@@ -72,7 +73,8 @@ fn an_entry_has_type_default_limits_and_mapping() {
 #[test]
 fn keys_without_a_row_are_the_vendors() {
     let mut info = DeviceInfo::new("Example", "I/O module");
-    (info.file_name, info.file_revision, info.date) = ("io.eds", 3, Some(("11-25-2026", "12:00AM")));
+    let edition = Some(("11-25-2026", "12:00AM"));
+    (info.file_name, info.file_revision, info.created, info.modified) = ("io.eds", 3, edition, edition);
     (info.bit_rates, info.has_lss) = (&[125, 250], false);
     let mut sheet = String::new();
     write(ROWS, &info, &mut sheet).unwrap();

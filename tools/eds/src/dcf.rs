@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use crate::write::{Sections, device_info, write_lists};
+use canopen::eds::Writer;
+
 use crate::{Eds, Reals};
 
 /// Section `[DeviceComissioning]` (with this spelling): the device that the values are for.
@@ -22,11 +23,11 @@ impl Eds {
     pub fn to_dcf(&self, file_name: &str, reals: Reals) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write_dcf(file_name, &mut Sections { out: &mut text, reals });
+        let _ = self.write_dcf(file_name, reals, &mut Writer::new(&mut text));
         text
     }
 
-    fn write_dcf(&self, file_name: &str, out: &mut Sections) -> fmt::Result {
+    fn write_dcf(&self, file_name: &str, reals: Reals, out: &mut Writer<'_, String>) -> fmt::Result {
         out.section("FileInfo", "")?;
         out.key("FileName", file_name)?;
         out.key("FileVersion", 1)?;
@@ -34,7 +35,7 @@ impl Eds {
         out.key("EDSVersion", "4.0")?;
         out.key("Description", format_args!("Configuration of {}", self.device.product_name))?;
         out.key("CreatedBy", "nodectl")?;
-        device_info(&self.device, out)?;
+        self.device.write(out)?;
         let Commissioning { node_id, bit_rate, serial } = self.commissioning.unwrap_or_default();
         out.section("DeviceComissioning", "")?;
         out.key("NodeID", node_id)?;
@@ -42,6 +43,6 @@ impl Eds {
         out.key("NetNumber", 0)?;
         out.key("CANopenManager", 0)?;
         out.key("LSS_SerialNumber", format_args!("0x{serial:08X}"))?;
-        write_lists(self, out)
+        self.write_objects(reals, out)
     }
 }

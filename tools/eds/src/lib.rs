@@ -17,7 +17,6 @@ mod ini;
 mod model;
 mod page;
 mod read;
-mod rows;
 mod types;
 mod value;
 mod write;

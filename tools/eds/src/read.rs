@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use canopen::eds::BIT_RATES;
+
 use crate::ini::{Ini, Section};
 use crate::value::repaired;
 use crate::{
@@ -9,16 +11,16 @@ use crate::{
     Problem, compact,
 };
 
-/// The bit rates in kbit/s and their keys in a data sheet.
-pub(crate) const BIT_RATES: [(u16, &str); 8] = [
-    (10, "BaudRate_10"),
-    (20, "BaudRate_20"),
-    (50, "BaudRate_50"),
-    (125, "BaudRate_125"),
-    (250, "BaudRate_250"),
-    (500, "BaudRate_500"),
-    (800, "BaudRate_800"),
-    (1000, "BaudRate_1000"),
+/// The keys of the bit rates, in their order.
+const RATE_KEYS: [&str; BIT_RATES.len()] = [
+    "BaudRate_10",
+    "BaudRate_20",
+    "BaudRate_50",
+    "BaudRate_125",
+    "BaudRate_250",
+    "BaudRate_500",
+    "BaudRate_800",
+    "BaudRate_1000",
 ];
 
 /// Smaller indices are data types, which some editors write as objects.
@@ -84,7 +86,8 @@ fn address(section: &str) -> Option<(u16, Option<u8>)> {
 
 fn device_info(section: Section) -> DeviceInfo {
     let text = |key| section.get(key).unwrap_or_default().to_owned();
-    let rates = BIT_RATES.into_iter().filter(|(_, key)| flag(section, key)).map(|(rate, _)| rate);
+    let rates =
+        BIT_RATES.into_iter().zip(RATE_KEYS).filter(|(_, key)| flag(section, key)).map(|(rate, _)| rate);
     DeviceInfo {
         vendor_name: text("VendorName"),
         vendor_number: section.number("VendorNumber"),

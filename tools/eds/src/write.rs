@@ -1,203 +1,147 @@
-//! Writer of data sheets: from [`Eds`] to text (CiA 306). The text is the same on every run.
+//! The text of a data sheet: from the dictionary table of a device, and from [`Eds`] (CiA 306). The form is that of
+//! [`canopen::eds`]. The text is the same on every run.
 
-use std::fmt::{self, Display, Write};
+use std::fmt;
 
-use profiles::product::REVISION;
+use canopen::dictionary::{DefaultValue, Object as Row};
+use canopen::eds::{self, BIT_RATES, DeviceKeys, EntryKeys, Writer};
+use profiles::product::{REVISION, VENDOR_ID};
 
-use crate::read::BIT_RATES;
-use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, ObjectType, Reals};
+use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, Reals};
 
 /// Day of the first release, month first (CiA 306).
 const CREATION_DATE: &str = "11-21-2026";
 const TIME: &str = "12:00AM";
 const AUTHOR: &str = "cargo xtask eds";
+/// Vendor and order code. CiA has assigned no vendor-ID to the project, and the keys must not be empty.
+const NONE: &str = "none";
 
 const COMMENTS: [&str; 2] = [
     "Generated from the dictionary table of the firmware by cargo xtask eds. Do not edit.",
     "The comment above a section is the physical unit; an index there is the object that selects the unit.",
 ];
 
-/// Data types that an RPDO can skip: the integer types (CiA 301, 7.4.7.1). BOOLEAN is no whole byte.
-const DUMMIES: [(&str, u8); 7] = [
-    ("Dummy0001", 0),
-    ("Dummy0002", 1),
-    ("Dummy0003", 1),
-    ("Dummy0004", 1),
-    ("Dummy0005", 1),
-    ("Dummy0006", 1),
-    ("Dummy0007", 1),
-];
-
 impl Device {
     /// The text of the data sheet in an edition.
     #[must_use]
     pub fn sheet(&self, edition: &Edition) -> String {
+        let mut info = eds::DeviceInfo::new(NONE, self.product_name());
+        (info.order_code, info.description, info.file_name) = (NONE, self.description, self.file_name);
+        (info.author, info.comments) = (AUTHOR, &COMMENTS);
+        (info.file_version, info.file_revision) = ((REVISION >> 16) as u16, edition.revision);
+        info.created = Some((CREATION_DATE, TIME));
+        info.modified = Some((&edition.date, TIME));
+        let rows: Vec<Row> = self.rows.iter().map(|row| self.identified(*row)).collect();
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write(edition, &mut Sections { out: &mut text, reals: Reals::Bits });
+        let _ = eds::write(&rows, &info, &mut text);
         text
     }
 
-    fn write(&self, edition: &Edition, out: &mut Sections) -> fmt::Result {
-        let eds = self.eds();
-        self.file_info(edition, out)?;
-        device_info(&eds.device, out)?;
-        dummies(out)?;
-        comments(out)?;
-        object_lists(&eds, out)
+    /// The data sheet as a value, with the units, which the text has in comments.
+    #[must_use]
+    pub fn eds(&self) -> Eds {
+        let mut eds = Eds::parse(&self.sheet(&Edition::default())).unwrap_or_default();
+        for row in self.rows {
+            let object = eds.objects.get_mut(&row.index);
+            if let Some(entry) = object.and_then(|object| object.entries.get_mut(&row.sub)) {
+                entry.unit = row.unit.into();
+            }
+        }
+        eds
     }
 
-    fn file_info(&self, edition: &Edition, out: &mut Sections) -> fmt::Result {
-        out.section("FileInfo", "")?;
-        out.key("FileName", self.file_name)?;
-        out.key("FileVersion", REVISION >> 16)?;
-        out.key("FileRevision", edition.revision)?;
-        out.key("EDSVersion", "4.0")?;
-        out.key("Description", self.description)?;
-        out.key("CreationTime", TIME)?;
-        out.key("CreationDate", CREATION_DATE)?;
-        out.key("CreatedBy", AUTHOR)?;
-        out.key("ModificationTime", TIME)?;
-        out.key("ModificationDate", &edition.date)?;
-        out.key("ModifiedBy", AUTHOR)
+    /// The rows of each object.
+    pub(crate) fn objects(&self) -> impl Iterator<Item = &'static [Row]> {
+        self.rows.chunk_by(|row, next| row.index == next.index)
+    }
+
+    /// Object 1008h.
+    fn product_name(&self) -> &'static str {
+        match self.rows.iter().find(|row| row.index == 0x1008).map(|row| row.default) {
+            Some(DefaultValue::Text(name)) => name,
+            _ => self.description,
+        }
+    }
+
+    /// The row with its default. The table has no identity, because the node itself fills it in. The serial number
+    /// differs in each device, and the identification of the program in each version.
+    fn identified(&self, mut row: Row) -> Row {
+        let number = |value: u32| DefaultValue::Integer(value.into());
+        row.default = match (row.index, row.sub) {
+            (0x1018, 1) => number(VENDOR_ID),
+            (0x1018, 2) => number(self.personality.product_code()),
+            (0x1018, 3) => number(REVISION),
+            (0x1018, 4) | (0x1F56, 1) => DefaultValue::None,
+            _ => row.default,
+        };
+        row
     }
 }
 
-pub(crate) fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Result {
-    out.section("DeviceInfo", "")?;
-    out.key("VendorName", &device.vendor_name)?;
-    out.key("VendorNumber", hex32(device.vendor_number))?;
-    out.key("ProductName", &device.product_name)?;
-    out.key("ProductNumber", hex32(device.product_number))?;
-    out.key("RevisionNumber", hex32(device.revision_number))?;
-    out.key("OrderCode", &device.order_code)?;
-    for (rate, key) in BIT_RATES {
-        out.key(key, u8::from(device.bit_rates.contains(&rate)))?;
+impl DeviceInfo {
+    pub(crate) fn write(&self, out: &mut Writer<'_, String>) -> fmt::Result {
+        let rates: Vec<u16> = BIT_RATES.into_iter().filter(|rate| self.bit_rates.contains(rate)).collect();
+        out.device(&DeviceKeys {
+            vendor: &self.vendor_name,
+            vendor_id: self.vendor_number,
+            product: &self.product_name,
+            product_code: self.product_number,
+            revision: self.revision_number,
+            order_code: &self.order_code,
+            bit_rates: &rates,
+            granularity: self.granularity,
+            has_multiplexed_pdos: self.group_messaging,
+            rpdos: self.rpdos,
+            tpdos: self.tpdos,
+            has_lss: self.lss,
+        })
     }
-    out.key("SimpleBootUpMaster", 0)?;
-    out.key("SimpleBootUpSlave", 1)?;
-    out.key("Granularity", device.granularity)?;
-    out.key("DynamicChannelsSupported", 0)?;
-    out.key("CompactPDO", 0)?;
-    out.key("GroupMessaging", u8::from(device.group_messaging))?;
-    out.key("NrOfRXPDO", device.rpdos)?;
-    out.key("NrOfTXPDO", device.tpdos)?;
-    out.key("LSS_Supported", u8::from(device.lss))
-}
-
-/// The sections behind the device that data sheets and configuration files share.
-pub(crate) fn write_lists(eds: &Eds, out: &mut Sections) -> fmt::Result {
-    dummies(out)?;
-    object_lists(eds, out)
-}
-
-fn dummies(out: &mut Sections) -> fmt::Result {
-    out.section("DummyUsage", "")?;
-    DUMMIES.into_iter().try_for_each(|(key, used)| out.key(key, used))
-}
-
-fn object_lists(eds: &Eds, out: &mut Sections) -> fmt::Result {
-    eds.objects("MandatoryObjects", is_mandatory, out)?;
-    eds.objects("OptionalObjects", |index| !is_mandatory(index) && !is_manufacturer(index), out)?;
-    eds.objects("ManufacturerObjects", is_manufacturer, out)
-}
-
-fn comments(out: &mut Sections) -> fmt::Result {
-    out.section("Comments", "")?;
-    out.key("Lines", COMMENTS.len())?;
-    (1..).zip(COMMENTS).try_for_each(|(i, line)| out.key(&format!("Line{i}"), line))
-}
-
-/// Whether an object is mandatory for every device (CiA 301).
-fn is_mandatory(index: u16) -> bool {
-    matches!(index, 0x1000 | 0x1001 | 0x1018)
-}
-
-fn is_manufacturer(index: u16) -> bool {
-    (0x2000..0x6000).contains(&index)
-}
-
-fn hex32(value: u32) -> String {
-    format!("0x{value:08X}")
 }
 
 impl Eds {
-    /// A list of objects, then each of them.
-    fn objects(&self, list: &str, belongs: impl Fn(u16) -> bool, out: &mut Sections) -> fmt::Result {
-        let objects: Vec<&Object> = self.objects.values().filter(|object| belongs(object.index)).collect();
-        out.section(list, "")?;
-        out.key("SupportedObjects", objects.len())?;
-        for (i, object) in (1..).zip(&objects) {
-            out.key(&format!("{i}"), format_args!("0x{:04X}", object.index))?;
-        }
-        objects.into_iter().try_for_each(|object| write_object(object, out))
+    /// The lists and the objects. `reals` is the form of real numbers that are the value of a parameter.
+    pub(crate) fn write_objects(&self, reals: Reals, out: &mut Writer<'_, String>) -> fmt::Result {
+        out.dummies()?;
+        out.objects(&self.objects.values(), |object| object.index, |out, object| object.write(reals, out))
     }
 }
 
-fn write_object(object: &Object, out: &mut Sections) -> fmt::Result {
-    let section = format!("{:04X}", object.index);
-    if !object.object_type.has_subs() {
-        return object.entries.values().try_for_each(|entry| write_entry(entry, &section, out));
+impl Object {
+    fn write(&self, reals: Reals, out: &mut Writer<'_, String>) -> fmt::Result {
+        let has_subs = self.object_type.has_subs();
+        if has_subs {
+            out.object(self.index, &self.name, self.object_type.code(), self.entries.len())?;
+        }
+        self.entries.values().try_for_each(|entry| entry.write(has_subs.then_some(entry.sub), reals, out))
     }
-    out.section(&section, "")?;
-    out.key("ParameterName", &object.name)?;
-    out.key("ObjectType", format_args!("0x{:X}", object.object_type.code()))?;
-    out.key("SubNumber", object.entries.len())?;
-    object
-        .entries
-        .values()
-        .try_for_each(|entry| write_entry(entry, &format!("{section}sub{:X}", entry.sub), out))
 }
 
-fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result {
-    out.section(section, &entry.unit)?;
-    out.key("ParameterName", &entry.name)?;
-    out.key("ObjectType", format_args!("0x{:X}", entry.object_type().code()))?;
-    out.key("DataType", format_args!("0x{:04X}", entry.data_type.0))?;
-    out.key("AccessType", entry.access.text())?;
-    let values = [
-        ("DefaultValue", &entry.default, Reals::Bits),
-        ("ParameterValue", &entry.value, out.reals),
-        ("LowLimit", &entry.low, Reals::Bits),
-        ("HighLimit", &entry.high, Reals::Bits),
-    ];
-    for (key, value, reals) in values {
-        if let Some(value) = value {
-            out.key(key, value.text(entry.data_type, reals))?;
-        }
-    }
-    if let Some(Flags(flags @ 1..)) = entry.flags {
-        out.key("ObjFlags", format_args!("0x{flags:X}"))?;
-    }
-    // CiA 306 has no such key for a domain, because no PDO carries one. The package canopen of npm refuses the key
-    // there.
-    if entry.object_type() == ObjectType::Domain {
-        return Ok(());
-    }
-    out.key("PDOMapping", u8::from(entry.mappable))
-}
-
-/// Sections of keys, with the line ends of CiA 306.
-pub(crate) struct Sections<'a> {
-    pub(crate) out: &'a mut String,
-    /// The form of real numbers that are the value of a parameter.
-    pub(crate) reals: Reals,
-}
-
-impl Sections<'_> {
-    /// Begins a section. The unit is a comment above the section, because every reader accepts a comment there. A key
-    /// `Unit`, which python-canopen reads, makes Lely's tools refuse the whole file.
-    pub(crate) fn section(&mut self, name: &str, unit: &str) -> fmt::Result {
-        if !self.out.is_empty() {
-            self.out.write_str("\r\n")?;
-        }
-        if !unit.is_empty() {
-            write!(self.out, "; Unit: {unit}\r\n")?;
-        }
-        write!(self.out, "[{name}]\r\n")
-    }
-
-    pub(crate) fn key(&mut self, key: &str, value: impl Display) -> fmt::Result {
-        write!(self.out, "{key}={value}\r\n")
+impl Entry {
+    fn write(&self, sub: Option<u8>, reals: Reals, out: &mut Writer<'_, String>) -> fmt::Result {
+        let values = [
+            ("DefaultValue", &self.default, Reals::Bits),
+            ("ParameterValue", &self.value, reals),
+            ("LowLimit", &self.low, Reals::Bits),
+            ("HighLimit", &self.high, Reals::Bits),
+        ];
+        let text = |(key, value, reals): (_, &Option<crate::Formula>, _)| {
+            Some((key, value.as_ref()?.text(self.data_type, reals)))
+        };
+        let values: Vec<(&str, String)> = values.into_iter().filter_map(text).collect();
+        let values: Vec<(&str, &dyn fmt::Display)> =
+            values.iter().map(|(key, value)| (*key, value as &dyn fmt::Display)).collect();
+        out.entry(&EntryKeys {
+            index: self.index,
+            sub,
+            unit: &self.unit,
+            name: &self.name,
+            object_type: self.object_type().code(),
+            data_type: self.data_type.0,
+            access: self.access.text(),
+            values: &values,
+            flags: self.flags.unwrap_or(Flags(0)).0,
+            is_mappable: self.mappable,
+        })
     }
 }
