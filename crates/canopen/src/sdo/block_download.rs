@@ -18,9 +18,9 @@ pub(super) struct Receiver {
     next_then: u8,
     /// Whether any segment of this block has arrived.
     has_begun: bool,
-    /// The last segment of the transfer, once it has arrived. The end of the transfer tells how many of its bytes are
-    /// data.
-    last: Option<[u8; 7]>,
+    /// Whether the last segment of the transfer has arrived, which is `newest` then. The end of the transfer tells how many
+    /// of its bytes are data.
+    is_complete: bool,
     /// The error of a segment. The end of the block reports it: the client sends the whole block before it listens, and
     /// no segment that is still on its way may be taken for a request.
     verdict: Result<(), Abort>,
@@ -35,7 +35,7 @@ impl Receiver {
             newest: None,
             next_then: 1,
             has_begun: false,
-            last: None,
+            is_complete: false,
             verdict: Ok(()),
         }
     }
@@ -46,7 +46,7 @@ impl Receiver {
 
     /// Whether the next frame is a segment and not a request.
     pub(super) fn expects_segments(&self) -> bool {
-        self.last.is_none()
+        !self.is_complete
     }
 
     /// Whether a block has begun and is not complete. If its last segment is lost, only a time-out can end the block.
@@ -101,9 +101,8 @@ impl Receiver {
     ) -> Result<(), Abort> {
         if segment.sequence.get() == self.next {
             self.next += 1;
-            if segment.last {
-                self.last = Some(segment.data);
-            } else {
+            self.is_complete = segment.last;
+            if !segment.last {
                 self.sink.append(&segment.data, buffer, objects)?;
             }
         }
@@ -127,7 +126,7 @@ impl Receiver {
         objects: &mut impl Objects,
         now: Tick,
     ) -> Result<(), Abort> {
-        if let Some(last) = &self.last {
+        if let Some(BlockSegment { data: last, .. }) = self.newest.as_ref().filter(|_| self.is_complete) {
             let data = last.get(..7 - usize::from(end.unused.min(7))).unwrap_or(last);
             self.sink.append(data, buffer, objects)?;
         }
