@@ -307,14 +307,6 @@ macro_rules! personalities {
                 }
             }
 
-            /// As [`Profile::initialise`]($crate::profile::Profile::initialise).
-            pub fn initialise(&mut self, image: &mut [u8], stored: canopen::dictionary::Groups) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.initialise(image, stored),)+
-                }
-            }
-
             /// As [`Profile::parameters`]($crate::profile::Profile::parameters).
             #[must_use]
             pub fn parameters(&self, image: &[u8]) -> Parameters {
@@ -334,156 +326,62 @@ macro_rules! personalities {
                 }
             }
 
-            /// As [`Profile::write`]($crate::profile::Profile::write).
-            ///
-            /// # Errors
-            /// The reason to refuse it.
-            pub fn write(
-                &mut self,
-                entry: &canopen::dictionary::Entry,
-                bytes: &[u8],
-                image: &mut [u8],
-            ) -> Result<(), canopen::sdo::Abort> {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.write(entry, bytes, image),)+
-                }
-            }
-
-            /// As [`Profile::received`]($crate::profile::Profile::received).
-            pub fn received(&mut self, rpdo: u16, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.received(rpdo, image),)+
-                }
-            }
-
-            /// As [`Profile::written`]($crate::profile::Profile::written).
-            pub fn written(&mut self, entry: &canopen::dictionary::Entry, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.written(entry, image),)+
-                }
-            }
-
-            /// As [`Profile::state`]($crate::profile::Profile::state).
-            pub fn state(&mut self, state: canopen::nmt::State, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.state(state, image),)+
-                }
-            }
-
-            /// As [`Profile::synchronised`]($crate::profile::Profile::synchronised).
-            pub fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.synchronised(counter, image),)+
-                }
-            }
-
-            /// As [`Profile::error`]($crate::profile::Profile::error).
-            pub fn error(&mut self, class: canopen::ErrorClass, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.error(class, image),)+
-                }
-            }
-
-            /// As [`Profile::show_flags`]($crate::profile::Profile::show_flags).
-            pub fn show_flags(&self, flags: $crate::fault::Flags, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.show_flags(flags, image),)+
-                }
-            }
-
-            /// As [`Profile::stores`]($crate::profile::Profile::stores).
-            #[must_use]
-            pub fn stores(&self, index: u16, sub: u8) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.stores(index, sub),)+
-                }
-            }
-
-            /// As [`Profile::switches_pdos`]($crate::profile::Profile::switches_pdos).
-            #[must_use]
-            pub fn switches_pdos(&self, index: u16) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.switches_pdos(index),)+
-                }
-            }
-
-            /// As [`Profile::sends_events`]($crate::profile::Profile::sends_events).
-            #[must_use]
-            pub fn sends_events(&self, tpdo: u16) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.sends_events(tpdo),)+
-                }
-            }
-
-            /// As [`Profile::begin_events`]($crate::profile::Profile::begin_events).
-            pub fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.begin_events(tpdo, image),)+
-                }
-            }
-
-            /// As [`Profile::next_event`]($crate::profile::Profile::next_event).
-            pub fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.next_event(tpdo, image),)+
-                }
-            }
-
-            /// As [`Profile::is_quiet`]($crate::profile::Profile::is_quiet).
-            #[must_use]
-            pub fn is_quiet(&self, place: usize) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.is_quiet(place),)+
-                }
-            }
-
-            /// As [`Profile::take_preset`]($crate::profile::Profile::take_preset).
-            pub fn take_preset(&mut self, image: &[u8]) -> Option<canopen::sdo::Multiplexer> {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.take_preset(image),)+
-                }
-            }
-
-            /// As [`Profile::takes_all_nodes`]($crate::profile::Profile::takes_all_nodes).
-            #[must_use]
-            pub fn takes_all_nodes(&self, rpdo: u16) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.takes_all_nodes(rpdo),)+
-                }
-            }
-
-            /// As [`Profile::broadcasts`]($crate::profile::Profile::broadcasts).
-            #[must_use]
-            pub fn broadcasts(&self, at: canopen::sdo::Multiplexer, image: &[u8]) -> bool {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.broadcasts(at, image),)+
-                }
-            }
-
-            /// As [`Profile::outputs`]($crate::profile::Profile::outputs).
-            #[must_use]
-            pub fn outputs(&self, image: &[u8]) -> $crate::board::Outputs {
-                use $crate::profile::Profile;
-                match self {
-                    $(AnyProfile::$Name(own) => own.outputs(image),)+
-                }
+            $crate::forwards! { [$($Name)+]
+                fn initialise(&mut self, image: &mut [u8], stored: canopen::dictionary::Groups);
+                fn write(
+                    &mut self,
+                    entry: &canopen::dictionary::Entry,
+                    bytes: &[u8],
+                    image: &mut [u8],
+                ) -> Result<(), canopen::sdo::Abort>;
+                fn received(&mut self, rpdo: u16, image: &mut [u8]);
+                fn written(&mut self, entry: &canopen::dictionary::Entry, image: &mut [u8]);
+                fn state(&mut self, state: canopen::nmt::State, image: &mut [u8]);
+                fn synchronised(&mut self, counter: Option<u8>, image: &mut [u8]);
+                fn error(&mut self, class: canopen::ErrorClass, image: &mut [u8]);
+                fn show_flags(&self, flags: $crate::fault::Flags, image: &mut [u8]);
+                fn stores(&self, index: u16, sub: u8) -> bool;
+                fn switches_pdos(&self, index: u16) -> bool;
+                fn sends_events(&self, tpdo: u16) -> bool;
+                fn begin_events(&mut self, tpdo: u16, image: &mut [u8]);
+                fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool;
+                fn is_quiet(&self, place: usize) -> bool;
+                fn take_preset(&mut self, image: &[u8]) -> Option<canopen::sdo::Multiplexer>;
+                fn takes_all_nodes(&self, rpdo: u16) -> bool;
+                fn broadcasts(&self, at: canopen::sdo::Multiplexer, image: &[u8]) -> bool;
+                fn outputs(&self, image: &[u8]) -> $crate::board::Outputs;
             }
         }
+    };
+}
+
+/// The hooks of [`Profile`](crate::profile::Profile) for a list of personalities: each calls that of the selected one.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! forwards {
+    ($names:tt) => {};
+    ($names:tt fn $hook:ident(&self, $($argument:ident: $Type:ty),+ $(,)?) $(-> $Result:ty)?; $($rest:tt)*) => {
+        #[doc = concat!("As `Profile::", stringify!($hook), "`.")]
+        #[allow(clippy::missing_errors_doc, clippy::must_use_candidate, reason = "as documented there")]
+        pub fn $hook(&self, $($argument: $Type),+) $(-> $Result)? {
+            $crate::forwards!(@match self $names $hook ($($argument),+))
+        }
+        $crate::forwards! { $names $($rest)* }
+    };
+    ($names:tt fn $hook:ident(&mut self, $($argument:ident: $Type:ty),+ $(,)?) $(-> $Result:ty)?; $($rest:tt)*) => {
+        #[doc = concat!("As `Profile::", stringify!($hook), "`.")]
+        #[allow(clippy::missing_errors_doc, clippy::must_use_candidate, reason = "as documented there")]
+        pub fn $hook(&mut self, $($argument: $Type),+) $(-> $Result)? {
+            $crate::forwards!(@match self $names $hook ($($argument),+))
+        }
+        $crate::forwards! { $names $($rest)* }
+    };
+    (@match $profile:ident [$($Name:ident)+] $hook:ident $arguments:tt) => {
+        match $profile {
+            $(AnyProfile::$Name(own) => $crate::forwards!(@call own $hook $arguments),)+
+        }
+    };
+    (@call $own:ident $hook:ident ($($argument:ident),+)) => {
+        $crate::profile::Profile::$hook($own, $($argument),+)
     };
 }
