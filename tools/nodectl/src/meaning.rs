@@ -20,10 +20,24 @@ pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<Strin
         let code = u16::from_le_bytes([low, high]);
         return Some(format!("{code:04X}h {}", error_name(code, detail, catalogue.is_of_this_project())));
     }
+    if at.index == 0x1016 && at.sub > 0 {
+        return monitored(u32::try_from(*number).ok()?);
+    }
     if at.sub > 0 && name.contains("physical unit") {
         return Some(symbol(u32::try_from(*number).ok()?));
     }
     (at.sub > 0 && name.contains("ai status")).then(|| status(*number))
+}
+
+/// An entry of the heartbeat consumer (1016h): the node and the time. Without one of both, the entry monitors no node.
+fn monitored(entry: u32) -> Option<String> {
+    let [low, high, node, reserved] = entry.to_le_bytes();
+    let time = u16::from_le_bytes([low, high]);
+    match (node, time, reserved) {
+        (0, _, 0) | (_, 0, 0) => Some("off".to_owned()),
+        (1..=127, _, 0) => Some(format!("node {node}, {time} ms")),
+        _ => None,
+    }
 }
 
 /// Status of an analogue input (CiA 404, 6150h).
@@ -138,6 +152,9 @@ mod tests {
             says(0x1003, 1, 0x0001_8130).as_deref(),
             Some("8130h heartbeat of a watched node is missing")
         );
+        assert_eq!(says(0x1016, 1, 0x0005_03E8).as_deref(), Some("node 5, 1000 ms"));
+        assert_eq!(says(0x1016, 1, 0x0005_0000).as_deref(), Some("off"));
+        assert_eq!((says(0x1016, 0, 4), says(0x1016, 1, 0x00FF_03E8)), (None, None));
         assert_eq!(says(0x6131, 0, 2), None);
         assert_eq!(says(0x1017, 0, 1000), None);
         let nan = of(&catalogue, at(0x6130, 1), &Value::Real32(f32::NAN));
