@@ -20,7 +20,7 @@ pub enum LookupError {
         similar: Vec<String>,
     },
     /// The text begins as an address and is none.
-    #[error("\"{text}\" is no address: an address is an index with a sub-index, such as {:04X}h:{}", .example.index, .example.sub)]
+    #[error("\"{text}\" is no address: an address is four hexadecimal digits and a sub-index up to 255, such as {:04X}h:{}", .example.index, .example.sub)]
     NoAddress {
         /// The text.
         text: String,

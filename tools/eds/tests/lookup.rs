@@ -60,8 +60,9 @@ fn a_text_that_begins_as_an_address_shows_what_an_address_looks_like() {
     for (text, example) in
         [("61300120h", "6130h:1"), ("0x61300120", "6130h:1"), ("1018.1", "1018h:1"), ("101", "1018h:1")]
     {
-        let words =
-            format!("\"{text}\" is no address: an address is an index with a sub-index, such as {example}");
+        let words = format!(
+            "\"{text}\" is no address: an address is four hexadecimal digits and a sub-index up to 255, such as {example}"
+        );
         assert_eq!(eds.find(text).unwrap_err().to_string(), words);
     }
 }
