@@ -153,6 +153,56 @@ def test_the_simulator_takes_each_waveform_as_it_is_offered(page: Page, board: i
     page.until(lambda: "const:" in shown_quantity(page, selector, quantity), "go back to the slider")
 
 
+PRESSURE_CONTROLS = {"Pressure, bar", "Temperature of the chip, °C", "Thermistor, °C", "open sensor", "open thermistor"}
+POSITION_CONTROLS = {"Shaft, revolutions", "Absolute encoder", "missing index", "open ssi"}
+CONTROLS_OF_EACH = {"Supply of the chip, V", "battery empty", "no crystal"}
+
+
+def controls(page: Page, board: int) -> set[str]:
+    """The labels of the controls of a board that are in view."""
+    code = "return [...document.querySelectorAll(arguments[0])].filter((label) => label.offsetParent).map((label) => label.innerText.trim())"
+    return set(page.script(code, f"#view-stimuli [data-board='{board}'] label"))
+
+
+@pytest.mark.parametrize(
+    ("board", "used", "unused"),
+    [(PRESSURE, PRESSURE_CONTROLS, POSITION_CONTROLS), (ENCODER, POSITION_CONTROLS, PRESSURE_CONTROLS)],
+)
+def test_a_board_has_the_controls_of_what_its_personality_reads(page: Page, board: int, used: set[str], unused: set[str]):
+    page.view("stimuli")
+    page.says(f"#view-stimuli [data-board='{board}']", "Supply of the chip")
+    shown = controls(page, board)
+    assert used | CONTROLS_OF_EACH <= shown
+    assert not unused & shown
+
+
+def test_a_board_has_more_controls_after_its_personality_has_changed(page: Page):
+    page.view("stimuli")
+    try:
+        change_personality(page, 2)
+        page.until(lambda: PRESSURE_CONTROLS | POSITION_CONTROLS <= controls(page, ENCODER), "show the controls of both devices")
+    finally:
+        change_personality(page, 1)
+    page.until(lambda: not PRESSURE_CONTROLS & controls(page, ENCODER), "show the controls of an encoder")
+
+
+def change_personality(page: Page, personality: int) -> None:
+    page.write(ENCODER, 0x2000, 0, personality)
+    page.request("nmt", node=ENCODER, command="reset")
+
+
+def test_supply_and_power_of_a_board_are_set_on_the_page(page: Page):
+    page.view("stimuli")
+    board = f"[data-board='{PRESSURE}']"
+    choose_waveform(page, board, "Supply of the chip", "step")
+    page.fill("To", "3.1", board)
+    page.press("Apply", board)
+    page.until(lambda: "step:" in shown_quantity(page, board, "Supply of the chip"), "say that the supply is a step")
+    choose_waveform(page, board, "Supply of the chip", "const")
+    page.press("Power on", board)
+    assert "no stimulus" not in page.text(f"#view-stimuli {board} .outcome")
+
+
 def choose_waveform(page: Page, board: str, quantity: str, form: str) -> None:
     label = f"{board} select[aria-label='Waveform of {quantity}']"
     Select(page.until(lambda: page.find(label), f"offer waveforms of {quantity}")).select_by_value(form)

@@ -19,6 +19,14 @@ pub enum LookupError {
         /// Names that contain the name, else names that are like it.
         similar: Vec<String>,
     },
+    /// The text begins as an address and is none.
+    #[error("\"{text}\" is no address: an address is four hexadecimal digits and a sub-index up to 255, such as {:04X}h:{}", .example.index, .example.sub)]
+    NoAddress {
+        /// The text.
+        text: String,
+        /// The address that may be meant, else any.
+        example: Multiplexer,
+    },
     /// Several entries have this name.
     #[error("\"{name}\" is the name of several objects{}", list(": ", candidates, ""))]
     Ambiguous {
@@ -56,11 +64,20 @@ impl Eds {
         match (&found[..], address(query)) {
             ([entry], _) => Ok(entry),
             ([], Some(at)) => self.get(at.index, at.sub).ok_or(LookupError::Address(at)),
-            ([], None) => Err(LookupError::Name { name: query.into(), similar: self.similar(&name) }),
+            ([], None) => Err(self.unknown(query, &name)),
             _ => {
                 Err(LookupError::Ambiguous { name: query.into(), candidates: self.addresses(&found, query) })
             }
         }
+    }
+
+    fn unknown(&self, query: &str, name: &str) -> LookupError {
+        let similar = self.similar(name);
+        if similar.is_empty() && is_like_an_address(name) {
+            let example = mapped(name).unwrap_or(Multiplexer { index: 0x1018, sub: 1 });
+            return LookupError::NoAddress { text: query.into(), example };
+        }
+        LookupError::Name { name: query.into(), similar }
     }
 
     /// The name by which [`Eds::find`] finds an entry: `Error register`, `Identity/Vendor-ID`.
@@ -159,6 +176,21 @@ pub fn address(text: &str) -> Option<Multiplexer> {
         _ => return None,
     };
     Some(Multiplexer { index: hex(index)?, sub: u8::try_from(sub).ok()? })
+}
+
+/// Whether a text is one word that begins with a digit.
+fn is_like_an_address(text: &str) -> bool {
+    text.starts_with(|first: char| first.is_ascii_digit()) && !text.contains(char::is_whitespace)
+}
+
+/// The object in the number of a mapping entry: index, sub-index and bits.
+fn mapped(text: &str) -> Option<Multiplexer> {
+    let text = text.strip_prefix("0x").unwrap_or(text);
+    let digits = text.strip_suffix('h').unwrap_or(text);
+    let (index, rest) = digits.split_at_checked(4).filter(|_| digits.len() == 8)?;
+    let (sub, bits) = rest.split_at_checked(2)?;
+    hex(bits)?;
+    Some(Multiplexer { index: hex(index)?, sub: u8::try_from(hex(sub)?).ok()? })
 }
 
 fn hex(digits: &str) -> Option<u16> {

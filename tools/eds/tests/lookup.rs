@@ -55,6 +55,19 @@ fn an_unknown_name_lists_similar_names() {
 }
 
 #[test]
+fn a_text_that_begins_as_an_address_shows_what_an_address_looks_like() {
+    let eds = DEVICES[0].eds();
+    for (text, example) in
+        [("61300120h", "6130h:1"), ("0x61300120", "6130h:1"), ("1018.1", "1018h:1"), ("101", "1018h:1")]
+    {
+        let words = format!(
+            "\"{text}\" is no address: an address is four hexadecimal digits and a sub-index up to 255, such as {example}"
+        );
+        assert_eq!(eds.find(text).unwrap_err().to_string(), words);
+    }
+}
+
+#[test]
 fn a_name_of_several_entries_is_ambiguous() {
     let error = DEVICES[0].eds().find("transmission type").unwrap_err();
     let LookupError::Ambiguous { candidates, .. } = &error else { panic!("{error}") };

@@ -4,6 +4,7 @@ use canopen::emcy::Message;
 use canopen::sdo::Multiplexer;
 
 use crate::unit::symbol;
+use crate::update::{Event, Log};
 use crate::value::Value;
 use crate::{Catalogue, explain};
 
@@ -13,6 +14,9 @@ pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<Strin
     if let Value::Real32(number) = value {
         return number.is_nan().then(|| "no valid value".to_owned());
     }
+    if let (0x2006, Value::Bytes(log), true) = (at.index, value, catalogue.is_of_this_project()) {
+        return update_log(log);
+    }
     let Value::Integer(number) = value else { return None };
     let name = catalogue.name(at).unwrap_or_default().to_lowercase();
     if at.index == 0x1003 && at.sub > 0 {
@@ -20,10 +24,47 @@ pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<Strin
         let code = u16::from_le_bytes([low, high]);
         return Some(format!("{code:04X}h {}", error_name(code, detail, catalogue.is_of_this_project())));
     }
+    if (at.index, at.sub) == (0x2002, 1) && catalogue.is_of_this_project() {
+        return trial(*number).map(str::to_owned);
+    }
+    if at.index == 0x1016 && at.sub > 0 {
+        return monitored(u32::try_from(*number).ok()?);
+    }
     if at.sub > 0 && name.contains("physical unit") {
         return Some(symbol(u32::try_from(*number).ok()?));
     }
     (at.sub > 0 && name.contains("ai status")).then(|| status(*number))
+}
+
+/// The events of the update log (2006h), the newest first; `None` without one.
+fn update_log(log: &[u8]) -> Option<String> {
+    let words =
+        |event: Event| format!("{}, key generation {}: {}", event.version, event.generation, event.outcome);
+    let events: Vec<String> = Log::from_bytes(log).events().map(words).collect();
+    (!events.is_empty()).then(|| events.join("; "))
+}
+
+/// The state of the trial of a program (2002h:1).
+fn trial(state: i128) -> Option<&'static str> {
+    [
+        "no trial",
+        "on trial",
+        "rolled back after three starts",
+        "rolled back by a command, or not confirmed in time",
+    ]
+    .get(usize::try_from(state).ok()?)
+    .copied()
+}
+
+/// An entry of the heartbeat consumer (1016h): the node and the time. Without one of both, the entry monitors no node.
+fn monitored(entry: u32) -> Option<String> {
+    let [low, high, node, reserved] = entry.to_le_bytes();
+    let time = u16::from_le_bytes([low, high]);
+    match (node, time, reserved) {
+        (0, _, 0) | (_, 0, 0) => Some("off".to_owned()),
+        (1..=127, _, 0) => Some(format!("node {node}, {time} ms")),
+        _ => None,
+    }
 }
 
 /// Status of an analogue input (CiA 404, 6150h).
@@ -138,6 +179,17 @@ mod tests {
             says(0x1003, 1, 0x0001_8130).as_deref(),
             Some("8130h heartbeat of a watched node is missing")
         );
+        assert_eq!(says(0x2002, 1, 1).as_deref(), Some("on trial"));
+        assert_eq!(says(0x2002, 1, 4), None);
+        let log = |bytes: &[u8]| of(&catalogue, at(0x2006, 0), &Value::Bytes(bytes.to_vec()));
+        assert_eq!(
+            log(&[3, 1, 0, 0, 0, 2, 0, 1, 1, 0, 0, 0, 0, 2, 0, 1]).as_deref(),
+            Some("0.2.0, key generation 1: confirmed by a command; 0.2.0, key generation 1: on trial")
+        );
+        assert_eq!(log(&[0; 128]), None);
+        assert_eq!(says(0x1016, 1, 0x0005_03E8).as_deref(), Some("node 5, 1000 ms"));
+        assert_eq!(says(0x1016, 1, 0x0005_0000).as_deref(), Some("off"));
+        assert_eq!((says(0x1016, 0, 4), says(0x1016, 1, 0x00FF_03E8)), (None, None));
         assert_eq!(says(0x6131, 0, 2), None);
         assert_eq!(says(0x1017, 0, 1000), None);
         let nan = of(&catalogue, at(0x6130, 1), &Value::Real32(f32::NAN));

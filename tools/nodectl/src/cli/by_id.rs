@@ -6,12 +6,9 @@ use std::fmt;
 use canopen::Instant;
 use serde::Serialize;
 
-use super::load;
+use super::load::{self, Peak};
 use crate::text::hex_digits;
 use crate::trace::{Kind, Line};
-
-/// The time over which the peak of the load is measured, in microseconds.
-const WINDOW: u64 = 100_000;
 
 /// The frames of all CAN-IDs.
 #[derive(Default)]
@@ -20,9 +17,7 @@ pub(super) struct ByCanId {
     first: Option<Instant>,
     last: Instant,
     bits: u64,
-    /// The number of the present window, its bits, and the most bits of a window.
-    window: (u64, u64),
-    peak: u64,
+    peak: Peak,
 }
 
 /// The frames of a CAN-ID.
@@ -68,12 +63,11 @@ fn milliseconds(micros: u64) -> f64 {
 impl ByCanId {
     /// Counts a frame of this service and node.
     pub(super) fn add(&mut self, id: u32, kind: Kind, node: Option<u8>, data: &[u8], at: Instant) {
-        let first = *self.first.get_or_insert(at);
+        self.first.get_or_insert(at);
         self.last = self.last.max(at);
         let bits = load::bits(data.len());
-        let window = at.0.saturating_sub(first.0) / WINDOW;
-        self.window = if window == self.window.0 { (window, self.window.1 + bits) } else { (window, bits) };
-        (self.bits, self.peak) = (self.bits + bits, self.peak.max(self.window.1));
+        self.bits += bits;
+        self.peak.add(bits, milliseconds(at.0) / 1000.0);
         let row = self.rows.entry(id).or_insert_with(|| Counted {
             kind,
             node,
@@ -116,15 +110,16 @@ impl ByCanId {
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn bus(&self, bit_rate: u16) -> Bus {
         let micros = self.first.map_or(0, |first| self.last.0.saturating_sub(first.0));
-        let percent = |bits: u64, micros: u64| {
-            let room = micros as f64 * f64::from(bit_rate) / 1000.0;
+        let seconds = milliseconds(micros) / 1000.0;
+        let percent = |bits: u64, seconds: f64| {
+            let room = seconds * f64::from(bit_rate) * 1000.0;
             if room == 0.0 { 0.0 } else { 100.0 * bits as f64 / room }
         };
         Bus {
             frames: self.rows.values().map(|row| row.count).sum(),
-            seconds: micros as f64 / 1e6,
-            load_percent: percent(self.bits, micros),
-            peak_percent: percent(self.peak, WINDOW.min(micros)),
+            seconds,
+            load_percent: percent(self.bits, seconds),
+            peak_percent: percent(self.peak.most(), load::WINDOW.min(seconds)),
         }
     }
 }

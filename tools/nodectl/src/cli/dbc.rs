@@ -16,20 +16,45 @@ use crate::tpdo::{self, Tpdo};
 /// The longest name of a message or a signal.
 const LONGEST: usize = 32;
 
-/// Writes the TPDOs of these nodes as they are configured.
+/// The lines of messages with their signals, and the lines of the types of signals.
+#[derive(Default)]
+struct Lines {
+    messages: String,
+    kinds: String,
+}
+
+/// Writes the TPDOs of these nodes as they are configured. A node that does not answer or refuses is left out, and is an
+/// error at the end. Without any node nothing is written.
 pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Result<(), Failure> {
-    let (mut messages, mut kinds) = (String::new(), String::new());
+    let (mut all, mut names, mut failures) = (Lines::default(), Vec::new(), Vec::new());
     for node in nodes {
-        session.begin_all();
-        let catalogue = session.catalogue(*node)?;
-        let found = tpdo::read(&mut session.client(*node), &catalogue);
-        let found = found.map_err(|error| session.named(error))?;
-        // A multiplexed PDO maps nothing: each of its frames names its object.
-        for tpdo in found.iter().filter(|tpdo| !tpdo.mapping.is_empty()) {
-            message(session, *node, &catalogue, tpdo, &mut messages, &mut kinds)?;
+        match read(session, *node) {
+            Ok(lines) => {
+                all.messages += &lines.messages;
+                all.kinds += &lines.kinds;
+                names.push(format!("Node{}", node.get()));
+            }
+            Err(failure @ Failure::Sdo(_)) if nodes.len() > 1 => {
+                session.tell(&failure)?;
+                failures.push(failure);
+            }
+            Err(failure) => return Err(failure),
         }
     }
-    let names: Vec<String> = nodes.iter().map(|node| format!("Node{}", node.get())).collect();
+    if !names.is_empty() {
+        save(session, &names, &all, file)?;
+    }
+    match failures.first() {
+        None => Ok(()),
+        Some(first) => {
+            let (missing, exit_code) = (failures.len(), first.exit_code());
+            Err(Failure::LeftOut { missing, all: nodes.len(), exit_code })
+        }
+    }
+}
+
+fn save(session: &mut Session, names: &[String], lines: &Lines, file: &Path) -> Result<(), Failure> {
+    let Lines { messages, kinds } = lines;
     let text = format!("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {}\n{messages}\n{kinds}", names.join(" "));
     if file.as_os_str() == "-" {
         return Ok(session.output.write(text.as_bytes())?);
@@ -37,13 +62,25 @@ pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Res
     Replacement::write(file, text.as_bytes())
 }
 
+fn read(session: &mut Session, node: NodeId) -> Result<Lines, Failure> {
+    session.begin_all();
+    let catalogue = session.catalogue(node)?;
+    let found = tpdo::read(&mut session.client(node), &catalogue);
+    let found = found.map_err(|error| session.named(error))?;
+    let mut lines = Lines::default();
+    // A multiplexed PDO maps nothing: each of its frames names its object.
+    for tpdo in found.iter().filter(|tpdo| !tpdo.mapping.is_empty()) {
+        message(session, node, &catalogue, tpdo, &mut lines)?;
+    }
+    Ok(lines)
+}
+
 fn message(
     session: &mut Session,
     node: NodeId,
     catalogue: &Catalogue,
     tpdo: &Tpdo,
-    messages: &mut String,
-    kinds: &mut String,
+    Lines { messages, kinds }: &mut Lines,
 ) -> Result<(), Failure> {
     let bits: usize = tpdo.mapping.iter().map(|mapped| usize::from(mapped.bits)).sum();
     let (id, node_id) = (tpdo.id, node.get());

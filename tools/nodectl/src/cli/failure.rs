@@ -68,6 +68,16 @@ pub enum Failure {
         /// The exit code of the first object that could not be read.
         exit_code: u8,
     },
+    /// Some nodes are not in the file that was written; each failure has been printed already.
+    #[error("{missing} of {all} nodes {} not in the file", if *.missing == 1 { "is" } else { "are" })]
+    LeftOut {
+        /// The number of nodes that could not be read.
+        missing: usize,
+        /// The number of all nodes.
+        all: usize,
+        /// The exit code of the first node that could not be read.
+        exit_code: u8,
+    },
     /// Two configurations differ.
     #[error("{}", counted(*.0, "parameter differs", "parameters differ"))]
     Different(usize),
@@ -149,7 +159,9 @@ impl Failure {
             Failure::Lss(lss::Error::Service(Service::NoAnswer(_))) | Failure::Silence(_) => 3,
             Failure::Bus(_) | Failure::Lss(lss::Error::Bus(_)) => 4,
             Failure::Update(error) => update_code(error),
-            Failure::Nodes { exit_code, .. } | Failure::Objects { exit_code, .. } => *exit_code,
+            Failure::Nodes { exit_code, .. }
+            | Failure::Objects { exit_code, .. }
+            | Failure::LeftOut { exit_code, .. } => *exit_code,
             Failure::File { .. } | Failure::Output(_) => 7,
         }
     }

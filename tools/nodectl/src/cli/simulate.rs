@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::path::PathBuf;
 
+use canopen::sdo::Request;
 use canopen::{Duration, Frame, NodeId, QueueFull, Transmit};
 use clap::Args;
 use serde::Serialize;
@@ -18,6 +19,8 @@ use crate::value::unsigned;
 
 /// The largest script.
 const LARGEST: u64 = 1 << 20;
+/// How long to listen for a node that has the node-ID already. A heartbeat comes once a second as a rule.
+const LISTEN: Duration = Duration::from_millis(1100);
 /// The longest wait for a frame, so that the end of the command is noticed.
 const WAKE: Duration = Duration::from_millis(100);
 
@@ -84,6 +87,11 @@ impl Simulate {
             device.set(at(0x1018, 4), &serial.to_le_bytes());
         }
         device = device.with_script(self.script(Catalogue::new(sheet))?);
+        if !self.unconfigured && is_in_use(session, node)? {
+            let words =
+                "is in use by another node on this bus: simulate a free one (`nodectl scan` lists the nodes)";
+            return Err(Failure::Usage(format!("node-ID {} {words}", node.get())));
+        }
         session.print(&running)?;
         self.serve(session, &mut device)
     }
@@ -120,6 +128,21 @@ impl Simulate {
             }
         }
     }
+}
+
+/// Whether a node answers with this node-ID, or sends its heartbeat. A stopped node answers no request.
+fn is_in_use(session: &mut Session, node: NodeId) -> Result<bool, Failure> {
+    let network = &mut session.network;
+    if network.heard(node).is_some() {
+        return Ok(true);
+    }
+    let id = u16::from(node.get());
+    if let Some(question) = Frame::new(0x600 + id, &Request::Upload(at(0x1000, 0)).encode()) {
+        network.send(&question)?;
+    }
+    let until = network.now() + LISTEN;
+    let is_of_node = |frame: &Frame| [0x580 + id, 0x700 + id].contains(&frame.id()) && !frame.is_remote();
+    Ok(network.wait(until, |frame| is_of_node(frame).then_some(()))?.is_some())
 }
 
 impl fmt::Display for Running {

@@ -54,11 +54,12 @@ const REFUSED: [&[&str]; 31] = [
 ];
 
 /// Command lines that the node, the data sheet or the command itself refuses.
-const FAILED: [&[&str]; 40] = [
+const FAILED: [&[&str]; 41] = [
     &["read", "no such thing"],
     &["read", "heartbet"],
     &["read", "event timer"],
     &["read", "1018:256"],
+    &["read", "61300120h"],
     &["read", "5FFF"],
     &["read", "1018:9"],
     &["read", "1010:1", "--node", "1-3"],

@@ -9,6 +9,7 @@ use nodectl::object::at;
 use nodectl::simulate::Node;
 
 use crate::commands::{failed, printed, run};
+use crate::pressure::Pressure;
 use crate::simulate::{corpus, device};
 use crate::wire::Wire;
 
@@ -104,6 +105,7 @@ fn each_way_to_be_wrong_is_found() {
         set(4, 0x1018, 3, 0x2_0000);
         set(5, 0x1018, 4, 9);
         nodes[5] = device("plain-pump.eds", 6);
+        nodes[5].set(at(0x1017, 0), &200_u16.to_le_bytes());
         nodes.push(device("plain-pump.eds", 99));
         nodes.retain(|node| !matches!(node.node_id().map(canopen::NodeId::get), Some(10 | 12)));
     });
@@ -234,4 +236,33 @@ fn a_dump_of_a_bus_is_a_file_that_fits_it() {
     printed(&wire, &["write", "1017", "350", "-n", "2"]);
     let (lines, _) = run(&wire, &["net", "check", file]);
     assert_eq!(lines, "node 2: value: 1017h:0 Producer heartbeat time is 350 instead of 300\n");
+}
+
+#[test]
+fn two_nodes_that_send_with_one_can_id_are_named() {
+    let wire = Wire::new(devices(3));
+    let file = file("shared.yaml", 3, |_| "", |_| "");
+    let file = file.to_str().unwrap();
+    printed(&wire, &["net", "apply", file]);
+    let set = |cob_id: &str| printed(&wire, &["write", "1800:1", cob_id, "-n", "2"]);
+    set("0x80000181");
+    assert_eq!(
+        printed(&wire, &["net", "check", file]),
+        "3 nodes are as the file says\n",
+        "it is switched off"
+    );
+    set("0x181");
+    let (lines, result) = run(&wire, &["net", "check", file]);
+    assert_eq!(result.unwrap_err().exit_code(), 11);
+    assert_eq!(lines, "can-id: TPDOs of nodes 1, 2 are sent with 181h\n");
+}
+
+#[test]
+fn a_monitored_node_is_shown_with_its_time() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("monitored.yaml");
+    fs::write(&file, "nodes:\n  - node: 1\n    consumes: { 5: 1000 }\n").unwrap();
+    let (lines, _) = run(&wire, &["net", "check", file.to_str().unwrap()]);
+    assert!(lines.starts_with("node 1: value: 1016h:1 "), "{lines}");
+    assert!(lines.ends_with(" is off instead of node 5, 1000 ms\n"), "{lines}");
 }

@@ -9,7 +9,7 @@ use nodectl::bus::Station;
 use nodectl::object::at;
 use nodectl::simulate::{Node, Script, Table};
 
-use crate::commands::{printed, run};
+use crate::commands::{failed, printed, run};
 use crate::wire::{Wire, client};
 
 pub(crate) fn corpus(name: &str) -> PathBuf {
@@ -106,6 +106,35 @@ fn a_device_without_a_node_id_is_found_by_lss() {
     assert!(printed(&wire, &["read", "1018:4", "-n", "40"]).contains("0000004Dh"));
 }
 
+/// A device that would start with node-ID 5.
+fn second(wire: &Wire<Node>) -> (u8, String) {
+    let eds = eds("plain-valve.eds");
+    failed(wire, &["simulate", "-n", "5", "--for", "1", &eds[0], &eds[1]])
+}
+
+#[test]
+fn a_node_id_that_is_in_use_is_not_simulated() {
+    let wire = Wire::new(device("plain-valve.eds", 5));
+    printed(&wire, &["nmt", "start", "-n", "5"]);
+    let (code, words) = second(&wire);
+    assert_eq!((code, words.contains("node-ID 5 is in use by another node")), (2, true), "{words}");
+    wire.station(|node| assert_eq!(node.state(), canopen::nmt::State::Operational, "no second boot-up"));
+    let eds = eds("plain-valve.eds");
+    let lines = printed(&wire, &["simulate", "-n", "6", "--for", "1", &eds[0], &eds[1]]);
+    assert!(lines.starts_with("node 6: "), "{lines}");
+    printed(&wire, &["simulate", "--unconfigured", "-n", "5", "--for", "1", &eds[0], &eds[1]]);
+}
+
+/// A stopped node answers no request.
+#[test]
+fn a_node_id_is_in_use_by_a_stopped_node_with_a_heartbeat() {
+    let wire = Wire::new(device("plain-valve.eds", 5));
+    printed(&wire, &["write", "1017", "1000", "-n", "5"]);
+    printed(&wire, &["nmt", "stop", "-n", "5"]);
+    let (code, words) = second(&wire);
+    assert_eq!((code, words.contains("node-ID 5 is in use")), (2, true), "{words}");
+}
+
 /// A reset communication after a new node-ID: the node boots with another one.
 #[test]
 fn reset_communication_finds_the_node_under_its_new_node_id() {
@@ -122,4 +151,23 @@ fn simulated_devices_pass_the_check_of_nodectl() {
         let (lines, result) = run(&wire, &["check", "-n", "5", &eds[0], &eds[1]]);
         assert!(result.is_ok(), "{name}: {lines}");
     }
+}
+
+#[test]
+fn a_dbc_file_has_the_nodes_that_answer() {
+    let wire = Wire::new(vec![device("plain-drive.eds", 1), device("plain-drive.eds", 2)]);
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("incomplete.dbc");
+    let (eds, path) = (eds("plain-drive.eds"), file.to_str().unwrap());
+    let _ = std::fs::remove_file(&file);
+    let (code, words) = failed(&wire, &["map", "--dbc", path, "-n", "1,2,9", &eds[0], &eds[1]]);
+    assert_eq!((code, words.as_str()), (3, "1 of 3 nodes is not in the file"));
+    let text = std::fs::read_to_string(&file).expect("a file");
+    assert!(text.contains("\nBU_: Node1 Node2\n") && text.contains(" Node2_TPDO1: "), "{text}");
+    let (lines, _) = run(&wire, &["map", "--json", "--dbc", path, "-n", "2,9", &eds[0], &eds[1]]);
+    let line: serde_json::Value = serde_json::from_str(lines.trim()).expect("the node that is left out");
+    assert_eq!((&line["node"], &line["exit_code"]), (&9.into(), &3.into()));
+    // Without any node the file stays as it is.
+    let before = std::fs::read(&file).unwrap();
+    assert_eq!(failed(&wire, &["map", "--dbc", path, "-n", "8,9", &eds[0], &eds[1]]).0, 3);
+    assert_eq!(std::fs::read(&file).unwrap(), before);
 }

@@ -9,15 +9,15 @@ use canopen::{Duration, NodeId};
 use serde::Serialize;
 
 use super::finding::{Finding, What, end, print};
+use super::senders::{Senders, listed};
 use super::{Failure, LISTEN, Session, catalogue, patience};
-use crate::Catalogue;
 use crate::configuration::Configuration;
-use crate::heartbeat;
 use crate::net::{Date, Plan, PlannedNode, Start};
 use crate::object::{Place, at};
 use crate::scan::{Presence, scan};
 use crate::text::{counted, visible};
 use crate::value::Value;
+use crate::{Catalogue, heartbeat, meaning};
 
 /// The nodes that a scan has found.
 pub(super) type Found = BTreeMap<NodeId, Presence>;
@@ -44,10 +44,12 @@ pub(super) fn run(session: &mut Session, plan: &Plan) -> Result<(), Failure> {
     tell(session, &of_bus(plan, &found))?;
     let present: Vec<&PlannedNode> =
         plan.nodes.iter().filter(|planned| is_there(&found, planned.node)).collect();
+    let mut senders = Senders::default();
     for planned in &present {
-        let findings = of_node(session, planned)?;
+        let findings = of_node(session, planned, &mut senders)?;
         tell(session, &findings)?;
     }
+    tell(session, &senders.findings(plan))?;
     let states = of_states(session, plan, &present)?;
     tell(session, &states)?;
     if count == 0 {
@@ -72,21 +74,22 @@ pub(super) fn of_bus(plan: &Plan, found: &Found) -> Vec<Finding> {
         Finding::new(*node, What::Unexpected, "the node is on the bus and not in the file".to_owned())
     });
     let shared = plan.shared_can_ids().into_iter().map(|(id, nodes)| {
-        let nodes: Vec<String> = nodes.iter().map(|node| node.get().to_string()).collect();
-        Finding {
-            node: None,
-            what: What::CanId,
-            text: format!("nodes {} send with {id:03X}h", nodes.join(", ")),
-        }
+        let text = format!("nodes {} are to send with {id:03X}h, by the file", listed(nodes));
+        Finding { node: None, what: What::CanId, text }
     });
     missing.chain(unexpected).chain(shared).collect()
 }
 
 /// Everything about a node. A node that falls silent is a finding, and does not end the command.
-fn of_node(session: &mut Session, planned: &PlannedNode) -> Result<Vec<Finding>, Failure> {
+fn of_node(
+    session: &mut Session,
+    planned: &PlannedNode,
+    senders: &mut Senders,
+) -> Result<Vec<Finding>, Failure> {
     session.begin_all();
     let mut findings = Vec::new();
-    if let Err(failure) = compare(session, planned, &mut findings) {
+    let compared = compare(session, planned, &mut findings);
+    if let Err(failure) = compared.and_then(|()| senders.read(session, planned)) {
         findings.push(Finding::of_failure(planned.node, failure)?);
     }
     Ok(findings)
@@ -106,7 +109,7 @@ fn compare(session: &mut Session, planned: &PlannedNode, findings: &mut Vec<Find
     let is_wanted = |at: Multiplexer| wanted.values.contains_key(&(at.index, at.sub));
     for difference in wanted.differences(&present).into_iter().filter(|one| is_wanted(one.at)) {
         let text = |value: &Option<Value>| {
-            value.as_ref().map_or("not there".to_owned(), |value| visible(&value.to_string()))
+            value.as_ref().map_or("not there".to_owned(), |value| words(&catalogue, difference.at, value))
         };
         let name = catalogue.name(difference.at).unwrap_or_default();
         let (wanted, present) = (text(&difference.first), text(&difference.second));
@@ -114,6 +117,12 @@ fn compare(session: &mut Session, planned: &PlannedNode, findings: &mut Vec<Find
         findings.push(Finding::new(planned.node, What::Value, words));
     }
     Ok(())
+}
+
+/// A value in words: its meaning for an entry of 1016h, else the value itself.
+fn words(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> String {
+    let meaning = meaning::of(catalogue, at, value).filter(|_| at.index == 0x1016);
+    meaning.unwrap_or_else(|| visible(&value.to_string()))
 }
 
 /// The values that a node has of the wanted parameters, and the COB-IDs and sizes of the PDOs to which they belong. A value

@@ -4,6 +4,7 @@ mod apply;
 mod check;
 mod dump;
 mod finding;
+mod senders;
 mod watch;
 
 use std::path::{Path, PathBuf};

@@ -2,10 +2,7 @@
 
 use canopen::Frame;
 
-use crate::cli::load;
-
-/// The time over which the peak of the load is measured, in seconds.
-const WINDOW: f64 = 0.1;
+use crate::cli::load::{self, Peak};
 
 /// Frames and bits since the last rate, and frames in total.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,14 +10,6 @@ pub(super) struct Count {
     frames: u32,
     bits: u64,
     pub(super) total: u64,
-}
-
-/// The most bits of a tenth of a second.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Peak {
-    begin: f64,
-    bits: u64,
-    most: u64,
 }
 
 /// The rates over a time.
@@ -50,25 +39,14 @@ impl Count {
     }
 }
 
-impl Peak {
-    /// Takes a frame with its time on the bus.
-    pub(super) fn add(&mut self, frame: &Frame, t: f64) {
-        if !(0.0..WINDOW).contains(&(t - self.begin)) {
-            (self.begin, self.bits) = (t, 0);
-        }
-        self.bits += bits(frame);
-        self.most = self.most.max(self.bits);
-    }
-
-    /// The greatest load since the last call.
-    pub(super) fn take(&mut self, kbit: Option<u16>) -> Option<f64> {
-        let most = std::mem::take(&mut self.most);
-        #[allow(clippy::cast_precision_loss)]
-        Rate { frames: 0.0, bits: most as f64 / WINDOW }.load(kbit)
-    }
+/// The load in the busiest tenth of a second since the last call.
+#[allow(clippy::cast_precision_loss)]
+pub(super) fn busiest(peak: &mut Peak, kbit: Option<u16>) -> Option<f64> {
+    Rate { frames: 0.0, bits: peak.take() as f64 / load::WINDOW }.load(kbit)
 }
 
-fn bits(frame: &Frame) -> u64 {
+/// Bits of a frame.
+pub(super) fn bits(frame: &Frame) -> u64 {
     load::bits(if frame.is_remote() { 0 } else { frame.len() })
 }
 
@@ -104,11 +82,11 @@ mod tests {
         let mut peak = Peak::default();
         let frame = Frame::new(0x181, &[0x55; 8]).unwrap();
         // 117 bits: 100 frames in 0.1 s at 250 kbit/s are 46.8 %, and one frame in the next 0.9 s.
-        (0..100_u8).for_each(|at| peak.add(&frame, 1.0 + f64::from(at) / 1e6));
-        peak.add(&frame, 1.9);
-        assert_eq!(peak.take(Some(250)), Some(0.468));
-        assert_eq!(peak.take(Some(250)), Some(0.0));
-        peak.add(&frame, 2.0);
-        assert_eq!(peak.take(None), None, "the bit rate is unknown");
+        (0..100_u8).for_each(|at| peak.add(bits(&frame), 1.0 + f64::from(at) / 1e6));
+        peak.add(bits(&frame), 1.9);
+        assert_eq!(busiest(&mut peak, Some(250)), Some(0.468));
+        assert_eq!(busiest(&mut peak, Some(250)), Some(0.0));
+        peak.add(bits(&frame), 2.0);
+        assert_eq!(busiest(&mut peak, None), None, "the bit rate is unknown");
     }
 }

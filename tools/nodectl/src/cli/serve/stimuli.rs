@@ -14,6 +14,9 @@ use super::order::Order;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// The time between two attempts to connect to the simulator.
 const AGAIN: Duration = Duration::from_secs(1);
+/// The stimuli that a page may change.
+const KINDS: [&str; 9] =
+    ["pressure", "temperature", "thermistor", "supply", "power", "shaft", "ssi", "button", "fault"];
 
 /// Passes every change of the stimuli to the pump, also a change by another program. Ends with the pump.
 pub(super) fn watch(control: SocketAddr, orders: Sender<Order>) {
@@ -70,9 +73,7 @@ fn exchange(control: SocketAddr, command: &str) -> io::Result<String> {
 /// The text has more than one line, or contains another command.
 pub(super) fn command(board: u8, kind: &str, spec: &str) -> Result<String, String> {
     let is_plain = |text: &str| !text.is_empty() && !text.chars().any(char::is_control);
-    if !matches!(kind, "pressure" | "temperature" | "thermistor" | "shaft" | "button" | "fault")
-        || !is_plain(spec)
-    {
+    if !KINDS.contains(&kind) || !is_plain(spec) {
         return Err(format!("{kind:?} {spec:?} is no stimulus"));
     }
     Ok(format!("{kind} {board}={spec}"))
@@ -85,6 +86,9 @@ mod tests {
     #[test]
     fn a_stimulus_is_one_line_and_no_other_command() {
         assert_eq!(command(1, "pressure", "const:300000").unwrap(), "pressure 1=const:300000");
+        for kind in ["supply", "power", "ssi"] {
+            assert_eq!(command(2, kind, "off").unwrap(), format!("{kind} 2=off"));
+        }
         for (kind, spec) in [
             ("quit", "1"),
             ("pressure", "const:1\nquit"),

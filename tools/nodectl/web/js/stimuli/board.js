@@ -1,9 +1,10 @@
 // The controls of one board: the inputs of its sensors, its buttons, its faults.
 
-import { button, el, field } from "../dom.js";
+import { button, el, field, set, text } from "../dom.js";
 import { outcome } from "../outcome.js";
 import { toggle } from "../parts/switch.js";
 import { Quantity } from "./quantity.js";
+import { hasEffect, reads } from "./uses.js";
 
 const KELVIN = 273.15;
 
@@ -27,19 +28,31 @@ export class Board {
     this.buttons = board.buttons.map((_, at) => this.#button(at + 1));
     this.format = el("input", { type: "text", size: 24, title: "Turns + steps in bits, then gray or binary, error, even or odd" });
     const power = POWER.map(([name, spec]) => button(name, () => this.#send("power", spec)));
-    const title = `Board ${board.board}${board.node == null ? "" : `: node ${board.node}, ${board.personality ?? "-"}`}`;
-    this.element = el("fieldset", { class: "box board", data: { board: board.board } }, el("legend", {}, title), this.quantities.map(({ element }) => element),
-      el("div", { class: "group", role: "group", "aria-label": "Power" }, power),
-      el("div", { class: "bar" }, field("Absolute encoder", this.format), button("Connect", () => this.#send("ssi", this.format.value))),
+    this.title = el("legend");
+    this.absolute = el("div", { class: "bar" }, field("Absolute encoder", this.format), button("Connect", () => this.#send("ssi", this.format.value)));
+    this.panel = el("div", { class: "group", role: "group", "aria-label": "Buttons" }, this.buttons);
+    this.element = el("fieldset", { class: "box board", data: { board: board.board } }, this.title, this.quantities.map(({ element }) => element),
+      el("div", { class: "group", role: "group", "aria-label": "Power" }, power), this.absolute,
       el("fieldset", {}, el("legend", {}, "Faults"), el("div", { class: "switches" }, [...this.switches.values()].map(({ element }) => element))),
-      el("div", { class: "group", role: "group", "aria-label": "Buttons" }, this.buttons), this.result.line);
+      this.panel, this.result.line);
     this.show(board);
   }
 
   show(board) {
+    this.#showUsed(board);
     for (const quantity of this.quantities) if (board[quantity.kind]) quantity.show(board[quantity.kind]);
     if (document.activeElement !== this.format) this.format.value = board.ssi ?? "";
     for (const [name, { box }] of this.switches) box.checked = board.faults.includes(name);
+  }
+
+  /** Shows the controls of the inputs that the personality reads. A fault that is on stays in view. */
+  #showUsed({ board, node, personality: configured, faults }) {
+    const personality = this.bus.nodes.get(node)?.personality ?? configured;
+    text(this.title, `Board ${board}${node == null ? "" : `: node ${node}, ${personality ?? "-"}`}`);
+    for (const { kind, element } of this.quantities) set(element, "hidden", !reads(personality, kind));
+    for (const [name, { element }] of this.switches) set(element, "hidden", !hasEffect(personality, name) && !faults.includes(name));
+    set(this.absolute, "hidden", !reads(personality, "ssi"));
+    set(this.panel, "hidden", !reads(personality, "button"));
   }
 
   #fault({ name, text }) {

@@ -9,6 +9,8 @@ export class Boards {
     Object.assign(this, { bus, isWanted, shown: new Map(), boards: [], faults: [] });
     this.element = el("div", { class: "boards" });
     bus.connection.on("stimuli", (message) => this.#take(message));
+    // A reset may give a node another personality.
+    bus.on("nodes", () => this.show());
     bus.on("connected", () => this.load());
   }
 

@@ -5,24 +5,39 @@ import { base64 } from "../file.js";
 import { hex } from "../format.js";
 import { outcome } from "../outcome.js";
 import { nodeChoice } from "../parts/node_choice.js";
+import { Programs } from "../update/programs.js";
 
 export function update(bus) {
   const view = new Update(bus);
-  return { name: "update", title: "Update", content: view.content };
+  return { name: "update", title: "Update", content: view.content, show: () => view.show(), hide: () => view.hide() };
 }
 
 class Update {
   constructor(bus) {
-    Object.assign(this, { bus, known: new Map(), inspected: null });
+    Object.assign(this, { bus, known: new Map(), inspected: null, isShown: false });
     this.result = outcome();
     this.checks = el("ul", { class: "checks", "aria-label": "Checks" });
     this.versions = el("p");
     this.bar = el("progress", { max: 1, "aria-label": "Progress of the update" });
     this.step = el("p", { role: "status" });
     this.back = el("div");
+    this.programs = new Programs(bus);
     this.content = this.#layout();
     bus.connection.on("update", (event) => event.node === bus.chosen && this.#progress(event));
     bus.on("chosen", () => this.#clear());
+    for (const event of ["chosen", "connected"]) bus.on(event, () => this.isShown && this.programs.show());
+    // A node that has just come has no personality yet.
+    let personality = null;
+    bus.on("nodes", () => personality !== (personality = bus.node()?.personality) && this.isShown && this.programs.show());
+  }
+
+  show() {
+    this.isShown = true;
+    return this.programs.show();
+  }
+
+  hide() {
+    this.isShown = false;
   }
 
   #layout() {
@@ -33,7 +48,7 @@ class Update {
     set(this.bar, "hidden", true);
     return el("div", {}, el("div", { class: "bar" }, nodeChoice(this.bus), field("Program", this.file, "a signed image, as firmware.img")),
       this.versions, this.checks, el("div", { class: "bar" }, el("label", {}, this.force, " also an older one, or the same again"), this.startButton),
-      this.bar, this.step, this.result.line, this.back);
+      this.bar, this.step, this.result.line, this.back, this.programs.element);
   }
 
   async #read(file) {
@@ -68,6 +83,7 @@ class Update {
     text(this.step, "");
     if (answer) this.#offerBack(answer);
     this.#offer();
+    await this.programs.show();
   }
 
   #progress({ step, text: words, done, all }) {

@@ -8,6 +8,7 @@ use crate::bus::clock;
 use crate::cli::serve::jobs;
 use crate::cli::serve::nodes::Node;
 use crate::cli::serve::schedule::{Haste, Lane};
+use crate::cli::serve::status;
 
 impl Pump {
     pub(super) fn tick(&mut self) {
@@ -133,7 +134,7 @@ impl Pump {
             self.looked = now;
             self.nodes.look(t, seconds, self.bit_rate);
             self.rate = self.count.rate(seconds);
-            self.busiest = self.peak.take(self.bit_rate);
+            self.busiest = status::busiest(&mut self.peak, self.bit_rate);
             self.controller = self.bus.as_mut().map(|bus| bus.controller()).unwrap_or_default();
         }
         for (page, entry) in self.pages.iter().filter(|(page, _)| self.setup.hub.has_room(*page)) {

@@ -9,6 +9,7 @@ use super::{AT_ONCE, LISTEN, Pump, REOPEN};
 use crate::Catalogue;
 use crate::bus::{BusError, Received, clock};
 use crate::cli::serve::jobs::Learned;
+use crate::cli::serve::status;
 use crate::trace::Transferred;
 
 impl Pump {
@@ -30,7 +31,7 @@ impl Pump {
         let frame = &received.frame;
         self.outlets.retain(|outlet| outlet.hand_over(received));
         self.count.add(frame);
-        self.peak.add(frame, t);
+        self.peak.add(status::bits(frame), t);
         if let Some(news) = self.nodes.on_frame(frame, t) {
             self.on_news(frame, t);
             self.pages.tell(&self.setup.hub, &json!(news));
@@ -87,7 +88,7 @@ impl Pump {
         }
         let (here, t) = (clock::now(), self.now());
         self.count.add(frame);
-        self.peak.add(frame, t);
+        self.peak.add(status::bits(frame), t);
         self.look_at_writes(frame, t);
         if self.pages.have_trace() {
             self.tracer.on_frame(frame, here, t, true);

@@ -21,12 +21,13 @@ use super::order::{Order, Refusal};
 use super::pages::Pages;
 use super::port::Outlet;
 use super::schedule::Schedule;
-use super::status::{Count, Peak, Rate};
+use super::status::{Count, Rate};
 use super::tracer::Tracer;
 use super::turn::Turn;
 use crate::Catalogue;
 use crate::bus::{Bus, BusError, Controller, clock};
 use crate::cli::Options;
+use crate::cli::load::Peak;
 use crate::other_clients::OtherClients;
 use crate::page::{Hub, PageId};
 
