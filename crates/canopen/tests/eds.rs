@@ -68,6 +68,7 @@ fn an_entry_has_type_default_limits_and_mapping() {
         assert!(entry.iter().any(|own| own == line), "{line}: {entry:?}");
     }
     assert!(section("6000sub1").iter().any(|line| line == "PDOMapping=1"));
+    assert!(section("2001sub1").iter().any(|line| line == "DefaultValue=1.5"));
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod types;
 mod value;
 mod write;
 
+pub use canopen::eds::Reals;
 pub use dcf::Commissioning;
 pub use device::{DEVICES, Device};
 pub use edition::Edition;
@@ -29,4 +30,4 @@ pub use find::{LookupError, address};
 pub use generated::{File, files};
 pub use model::{DeviceInfo, Eds, Entry, Flags, Object};
 pub use types::{Access, Class, DataType, ObjectType};
-pub use value::{Formula, Reals, Value};
+pub use value::{Formula, Value};

@@ -1,6 +1,7 @@
 //! Values of a data sheet: numbers, text, and formulas with the node-ID.
 
 use canopen::NodeId;
+use canopen::eds::Reals;
 
 use crate::{Class, DataType};
 
@@ -13,16 +14,6 @@ pub enum Value {
     Real(f64),
     /// A value of any other type, as the file writes it.
     Text(String),
-}
-
-/// The form of real numbers in a file. No form is read by all tools.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reals {
-    /// The bits, as `0x3FC00000`. Lely's tools refuse a file with any other form. python-canopen does not know the value
-    /// then, unless it is 0, and the package canopen of npm reads an integer.
-    Bits,
-    /// Decimal, as `1.5`. python-canopen and most data sheets of vendors have this form.
-    Decimal,
 }
 
 /// A value that may depend on the node-ID (CiA 306, `$NODEID`).

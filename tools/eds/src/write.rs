@@ -27,7 +27,7 @@ impl Device {
     pub fn sheet(&self, edition: &Edition) -> String {
         let mut info = eds::DeviceInfo::new(NONE, self.product_name());
         (info.order_code, info.description, info.file_name) = (NONE, self.description, self.file_name);
-        (info.author, info.comments) = (AUTHOR, &COMMENTS);
+        (info.author, info.comments, info.reals) = (AUTHOR, &COMMENTS, Reals::Bits);
         (info.file_version, info.file_revision) = ((REVISION >> 16) as u16, edition.revision);
         info.created = Some((CREATION_DATE, TIME));
         info.modified = Some((&edition.date, TIME));

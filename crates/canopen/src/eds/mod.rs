@@ -50,13 +50,25 @@ pub struct DeviceInfo<'a> {
     pub bit_rates: &'a [u16],
     /// Whether the device has an LSS slave ([`Application::LSS`](crate::Application::LSS)).
     pub has_lss: bool,
+    /// The form of real numbers.
+    pub reals: Reals,
     /// Lines of comment.
     pub comments: &'a [&'a str],
 }
 
+/// The form of real numbers in a file. No form is read by all tools; 0 is `0` in both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reals {
+    /// The bits, as `0x3FC00000`. Lely's tools refuse a file with any other form. python-canopen does not know the value
+    /// then, and the package canopen of npm reads an integer.
+    Bits,
+    /// Decimal, as `1.5`. python-canopen and most data sheets of vendors have this form.
+    Decimal,
+}
+
 impl<'a> DeviceInfo<'a> {
-    /// A device with all bit rates and with LSS, and a file `device.eds` of the vendor without a date. The name of the
-    /// product is its order code, too.
+    /// A device with all bit rates and with LSS, and a file `device.eds` of the vendor without a date, with decimal real
+    /// numbers. The name of the product is its order code, too.
     #[must_use]
     pub const fn new(vendor: &'a str, product: &'a str) -> DeviceInfo<'a> {
         DeviceInfo {
@@ -72,6 +84,7 @@ impl<'a> DeviceInfo<'a> {
             modified: None,
             bit_rates: &BIT_RATES,
             has_lss: true,
+            reals: Reals::Decimal,
             comments: &[],
         }
     }
@@ -88,7 +101,8 @@ pub fn write(rows: &[Object], device: &DeviceInfo<'_>, out: &mut impl Write) -> 
     out.dummies()?;
     out.comments(device.comments)?;
     let objects = rows.chunk_by(|row, next| row.index == next.index);
-    out.objects(&objects, |object| object.first().map_or(0, |row| row.index), write_object)
+    let index = |object: &&[Object]| object.first().map_or(0, |row| row.index);
+    out.objects(&objects, index, |out, rows| write_object(rows, device.reals, out))
 }
 
 fn write_file_info<W: Write>(device: &DeviceInfo<'_>, out: &mut Writer<'_, W>) -> Result {
@@ -147,13 +161,13 @@ fn is_multiplexed(row: &Object) -> bool {
     is_count && matches!(row.default, DefaultValue::Integer(254..=255))
 }
 
-fn write_object<W: Write>(out: &mut Writer<'_, W>, rows: &[Object]) -> Result {
+fn write_object<W: Write>(rows: &[Object], reals: Reals, out: &mut Writer<'_, W>) -> Result {
     let Some(head) = rows.first() else { return Ok(()) };
     let object_type = object_type(rows);
     if matches!(object_type, ARRAY | RECORD) {
         out.object(head.index, head.name, object_type, rows.len())?;
     }
-    rows.iter().try_for_each(|row| write_entry(row, rows, object_type, out))
+    rows.iter().try_for_each(|row| write_entry(row, rows, object_type, reals, out))
 }
 
 /// The type of an object. An object of one row is a variable or a domain. An object of several rows is an array when
@@ -174,11 +188,17 @@ const fn is_record(index: u16) -> bool {
     matches!(index, 0x1018 | 0x1023 | 0x1025 | 0x1200..=0x12FF | 0x1400..=0x1BFF)
 }
 
-fn write_entry<W: Write>(row: &Object, rows: &[Object], object_type: u8, out: &mut Writer<'_, W>) -> Result {
+fn write_entry<W: Write>(
+    row: &Object,
+    rows: &[Object],
+    object_type: u8,
+    reals: Reals,
+    out: &mut Writer<'_, W>,
+) -> Result {
     let has_subs = matches!(object_type, ARRAY | RECORD);
-    let default = Default(row);
+    let default = Default(row, reals);
     let (low, high) = row.limits.unwrap_or_default();
-    let (low, high) = (Number(low, row.kind), Number(high, row.kind));
+    let (low, high) = (Number(low, row.kind, reals), Number(high, row.kind, reals));
     let values: [(&str, &dyn Display); 3] =
         [("DefaultValue", &default), ("LowLimit", &low), ("HighLimit", &high)];
     let (defaults, limits) = values.split_at(1);
@@ -237,7 +257,7 @@ impl Display for EntryName<'_> {
 }
 
 /// The default of a row. An empty text is none: the application fills it in.
-struct Default<'a>(&'a Object);
+struct Default<'a>(&'a Object, Reals);
 
 impl Default<'_> {
     fn is_written(&self) -> bool {
@@ -248,10 +268,10 @@ impl Default<'_> {
 impl Display for Default<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self.0.default {
-            DefaultValue::Integer(value) => Number(value, self.0.kind).fmt(f),
-            // Real numbers are bits, and 0 is written as `0`, which every reader understands.
-            DefaultValue::Real(value) if value.to_bits() == 0 => f.write_str("0"),
-            DefaultValue::Real(value) => write!(f, "0x{:08X}", value.to_bits()),
+            DefaultValue::Integer(value) => Number(value, self.0.kind, self.1).fmt(f),
+            DefaultValue::Real(0.0) => f.write_str("0"),
+            DefaultValue::Real(value) if self.1 == Reals::Bits => write!(f, "0x{:08X}", value.to_bits()),
+            DefaultValue::Real(value) => write!(f, "{value:?}"),
             DefaultValue::Text(text) => f.write_str(text),
             DefaultValue::NodeId(base) => write!(f, "$NODEID+0x{base:X}"),
             DefaultValue::None => Ok(()),
@@ -259,15 +279,17 @@ impl Display for Default<'_> {
     }
 }
 
-/// A number of a type; for REAL64, its bits. Identifiers, mapped objects and units have all their digits, because people
-/// read them digit by digit.
-struct Number(i64, Type);
+/// A number of a type. Identifiers, mapped objects and units have all their digits, because people read them digit by
+/// digit. The number of a REAL64 is its bits.
+struct Number(i64, Type, Reals);
 
 impl Display for Number {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Number(value, kind) = *self;
+        let Number(value, kind, reals) = *self;
         match (kind, kind.range()) {
-            (Type::Real64, _) if value != 0 => write!(f, "0x{value:016X}"),
+            (Type::Real64, _) if value == 0 => f.write_str("0"),
+            (Type::Real64, _) if reals == Reals::Bits => write!(f, "0x{value:016X}"),
+            (Type::Real64, _) => write!(f, "{:?}", f64::from_bits(value.cast_unsigned())),
             (_, Some((0, _))) if kind.size() >= 4 => {
                 write!(f, "0x{value:0width$X}", width = 2 * usize::from(kind.size()))
             }

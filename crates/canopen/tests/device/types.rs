@@ -121,5 +121,5 @@ fn a_real64_is_sent_by_pdo() {
 fn the_eds_has_the_value_of_a_real64_and_not_its_bits() {
     let mut text = String::new();
     eds::write(ROWS, &eds::DeviceInfo::new("", ""), &mut text).unwrap();
-    assert!(text.contains("DataType=0x0011\nAccessType=rwr\nDefaultValue=-0.1\n"), "{text}");
+    assert!(text.contains("DataType=0x0011\r\nAccessType=rwr\r\nDefaultValue=-0.1\r\n"), "{text}");
 }
