@@ -33,8 +33,8 @@ enum Command {
     Public {
         /// The secret key, PKCS#8 in PEM
         file: PathBuf,
-        /// The rank of the key in the bootloader
-        #[arg(long, value_enum, default_value = "release")]
+        /// The rank of the key in the bootloader; the file does not contain it
+        #[arg(long, value_enum)]
         rank: RankName,
     },
     /// Certify a release key with the root key, or a root key with the recovery key
@@ -98,7 +98,7 @@ struct KeyListArgs {
 struct ImageArgs {
     /// The ELF file, or the binary from 0x08020200 on
     file: PathBuf,
-    /// The secret key, PKCS#8 in PEM [default: the development key, which is known to everybody]
+    /// The secret key, PKCS#8 in PEM [default: the development key, which is published in the repository]
     #[arg(long)]
     key: Option<PathBuf>,
     /// The board that the image is for, as in 2004h:1
@@ -132,7 +132,7 @@ fn signing_key(path: Option<&Path>) -> Result<ed25519_dalek::SigningKey> {
     let development = key::development_path();
     let key = key::read(path.unwrap_or(&development))?;
     if key::is_development(&key) {
-        eprintln!("warning: the development key is known to everybody");
+        eprintln!("warning: the development key is published in this repository, so anyone can sign with it");
     }
     Ok(key)
 }
