@@ -16,7 +16,7 @@ use crate::tpdo::{self, Tpdo};
 /// The longest name of a message or a signal.
 const LONGEST: usize = 32;
 
-/// Writes the TPDOs of these nodes as they are configured.
+/// Writes the configured TPDOs of these nodes.
 pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Result<(), Failure> {
     let (mut messages, mut kinds) = (String::new(), String::new());
     for node in nodes {
