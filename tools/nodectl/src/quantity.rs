@@ -143,14 +143,14 @@ impl Scale {
     }
 }
 
-/// A value with its unit, and `hexadecimal` between them. A number of steps such as `100 us` is shown as their product:
-/// `10 ms (100 x 100 us)`.
+/// A value with its unit, and `hexadecimal` between them. A number of steps such as `100 us` has the product behind it:
+/// `100 x 100 us (10 ms)`. The number that `write` takes is in front.
 #[must_use]
 pub(crate) fn with_unit(value: &Value, hexadecimal: &str, unit: &str) -> String {
     let number = visible(&value.to_string());
     match (steps(value, unit), unit) {
         (Some(zero), _) if *value == Value::Integer(0) => zero,
-        (Some(product), unit) => format!("{product} ({number} x {unit})"),
+        (Some(product), unit) => format!("{number} x {unit} ({product})"),
         (None, "") => format!("{number}{hexadecimal}"),
         (None, unit) => format!("{number}{hexadecimal} {unit}"),
     }
@@ -228,11 +228,11 @@ mod tests {
     #[test]
     fn a_number_of_steps_is_shown_as_their_product() {
         for (number, unit, text) in [
-            (100, "100 us", "10 ms (100 x 100 us)"),
-            (25, "100 us", "2.5 ms (25 x 100 us)"),
+            (100, "100 us", "100 x 100 us (10 ms)"),
+            (25, "100 us", "25 x 100 us (2.5 ms)"),
             (0, "100 us", "0 ms"),
-            (12345, "0.1 h", "1234.5 h (12345 x 0.1 h)"),
-            (-7, "0.1 mm/s", "-0.7 mm/s (-7 x 0.1 mm/s)"),
+            (12345, "0.1 h", "12345 x 0.1 h (1234.5 h)"),
+            (-7, "0.1 mm/s", "-7 x 0.1 mm/s (-0.7 mm/s)"),
             (1000, "ms", "1000 ms"),
             (3, "1/K", "3 1/K"),
             (3, "steps or nm", "3 steps or nm"),

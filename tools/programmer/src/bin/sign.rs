@@ -33,9 +33,9 @@ enum Command {
     Public {
         /// The secret key, PKCS#8 in PEM
         file: PathBuf,
-        /// The rank of the key in the bootloader; the file does not contain it
+        /// The rank of the key in the bootloader, which selects the variable; the file does not contain it
         #[arg(long, value_enum)]
-        rank: RankName,
+        rank: Option<RankName>,
     },
     /// Certify a release key with the root key, or a root key with the recovery key
     KeyList(KeyListArgs),
@@ -148,6 +148,14 @@ fn make_key(path: &Path, rank: RankName) -> Result<()> {
     Ok(())
 }
 
+/// The variable of a rank; without a rank, the digits after a neutral name.
+fn public_line(key: &ed25519_dalek::SigningKey, rank: Option<RankName>) -> String {
+    match rank {
+        Some(rank) => key::variable(key, rank.into()),
+        None => format!("PUBLIC_KEY={}", key::public_digits(key)),
+    }
+}
+
 fn read_key_list(path: Option<&Path>) -> Result<KeyList> {
     let Some(path) = path else { return Ok(KeyList::default()) };
     key_list::read(&read(path)?).with_context(|| path.display().to_string())
@@ -230,9 +238,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Key { file, rank } => make_key(&file, rank),
         Command::KeyList(args) => make_key_list(&args),
-        Command::Public { file, rank } => {
-            key::read(&file).map(|key| println!("{}", key::variable(&key, rank.into())))
-        }
+        Command::Public { file, rank } => key::read(&file).map(|key| println!("{}", public_line(&key, rank))),
         Command::Image(args) => make_image(&args),
         Command::Show { file, key } => show_file(&file, key.as_deref()),
     };
