@@ -57,7 +57,7 @@ impl Content {
             );
         }
         let is_mixed = !content.is_for_development() && content.trusts(&DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
-        ensure!(!is_mixed, "the bootloader is one for development: it trusts a key that everybody knows");
+        ensure!(!is_mixed, "the bootloader is one for development: it trusts a published key");
         Ok(content)
     }
 
