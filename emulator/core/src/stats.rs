@@ -210,7 +210,7 @@ mod tests {
     fn a_reset_is_between_two_series_of_intervals() {
         let mut stats = Stats::default();
         let exception = Exception::irq(56);
-        let mut enter = |stats: &mut Stats, at| {
+        let enter = |stats: &mut Stats, at| {
             let at = Time::from_millis(at);
             stats.entered(exception, Entry { requested: at, level: 0, cycle: Time(1) }, at, 0);
             stats.left(at);
