@@ -129,7 +129,7 @@ pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
         cause.name()
     );
     if retained::is_development() {
-        defmt::warn!("the bootloader is for development: it starts what nobody has signed");
+        defmt::warn!("development bootloader: it accepts unsigned applications");
     }
     match setup.node_id {
         Some(node_id) => defmt::info!("node {=u8}", node_id.get()),

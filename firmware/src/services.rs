@@ -282,7 +282,7 @@ impl Services {
         next
     }
 
-    /// Goes on the bus, without filters at first, because the identifiers are known only after the start of the
+    /// Joins the bus, without filters at first, because the identifiers are known only after the start of the
     /// protocol. False if the bit rate has to be detected first.
     fn go_on_bus(&mut self, node: &mut impl Shared) -> bool {
         node.call(|_, queue| queue.clear());

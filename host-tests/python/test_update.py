@@ -172,6 +172,8 @@ def test_the_documented_commands_lead_from_a_key_to_an_accepted_update(tmp_path:
         assert re.fullmatch(r"UPDATE_(RELEASE|ROOT|RECOVERY)_KEY=[0-9a-f]{64}\n", sign(command))
     for name, secret in [("secret/release.pem", 0x42), ("safe/root.pem", 0x43), ("vault/recovery.pem", 0x44)]:
         (home / name).write_text(pem(bytes([secret] * 32)))
+    assert sign("public ~/safe/root.pem --rank root").startswith("UPDATE_ROOT_KEY=")
+    assert sign("public ~/safe/root.pem").startswith("PUBLIC_KEY="), "a file does not contain the rank"
     files = {"RELEASE_1": "secret/release-1", "ROOT_1": "safe/root-1", "RELEASE_2": "secret/release-2"}
     for command in documented("key-list"):
         for word, file in files.items():

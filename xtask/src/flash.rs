@@ -104,7 +104,8 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
 /// The public half of the key in this file, as hexadecimal digits.
 fn variable(key: &Path) -> Result<String> {
     let path = key.to_str().context("a path that is no text")?;
-    let line = output(built("sign"), &["public", path])
-        .with_context(|| format!("the key cannot be read: `cargo xtask sign public {path}` says more"))?;
+    let line = output(built("sign"), &["public", "--rank", "release", path]).with_context(|| {
+        format!("the key cannot be read: `cargo xtask sign public --rank release {path}` says more")
+    })?;
     Ok(line.split_once('=').context("`sign public` prints a variable")?.1.to_owned())
 }

@@ -16,7 +16,7 @@ pub(crate) fn dir() -> PathBuf {
 }
 
 /// Images for a board on a desk, emulated or not. The bootloader starts unsigned images, and trusts the development key,
-/// which everybody knows. The application counts more for its self-test, and obeys its commands.
+/// which is published in the repository. The application counts more for its self-test, and obeys its commands.
 pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development,firmware/development"];
 
 /// The default chip of the images.

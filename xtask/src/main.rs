@@ -52,8 +52,8 @@ struct Cli {
 enum Command {
     /// Build the firmware and the bootloader for the Cortex-M4 (with the keys in UPDATE_RELEASE_KEY, UPDATE_ROOT_KEY and UPDATE_RECOVERY_KEY)
     Images {
-        /// For a board on a desk: the bootloader starts unsigned images and trusts the development key, which everybody
-        /// knows; the firmware is signed with this key. Also builds the images for the tests
+        /// For a board on a desk: the bootloader starts unsigned images and trusts the development key, which is
+        /// published in the repository; the firmware is signed with this key. Also builds the images for the tests
         #[arg(long)]
         development: bool,
     },

@@ -47,7 +47,7 @@ fn chip(flags: &[OsString]) -> &str {
 /// Replaces this process by the simulator with the user's flags, so that a signal to `cargo sim` reaches the simulator.
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     setup::check(setup::SIM)?;
-    eprintln!("images for development: the bootloader starts what nobody has signed (docs/update.md)");
+    eprintln!("development images: the bootloader accepts unsigned applications (docs/update.md)");
     let images = build_all(chip(flags))?;
     images::sign(Command::new(built("sign")), &images)?;
     let mut simulator = with_images(&built("sim"), &images);

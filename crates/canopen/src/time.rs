@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn no_deadline_stays_none_and_what_is_long_past_stays_past() {
+    fn a_missing_deadline_stays_missing_and_a_past_deadline_stays_past() {
         let mut clock = Clock::new();
         let (now, by) = clock.follow(Instant(u64::MAX / 2));
         let (mut never, mut past) = (Tick::NEVER, Tick::since_epoch(5));

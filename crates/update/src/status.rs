@@ -73,7 +73,7 @@ impl fmt::Display for Status {
             72 => f.write_str(
                 "the new program was not confirmed in time, or was rolled back; the previous program runs again",
             ),
-            73 => f.write_str("the program is on trial: confirm it or take it back before the next update"),
+            73 => f.write_str("the program is on trial: confirm it or roll it back before the next update"),
             71 => {
                 write!(f, "the key of the image is revoked (the node asks for generation {detail} or more)")
             }

@@ -78,7 +78,7 @@ pub enum Effect {
     Poke,
 }
 
-/// Reads memory for a DMA transfer out of it.
+/// Reads memory for a DMA transfer from memory.
 pub trait Memory {
     /// Reads `bytes.len()` bytes at an absolute address of RAM or flash.
     fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault>;

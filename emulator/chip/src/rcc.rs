@@ -186,7 +186,7 @@ impl Rcc {
     }
 
     /// Sets the clock on OSC_IN from now on; `None` removes it. Without a clock HSE never becomes ready. A system clock
-    /// derived from HSE goes on as if from HSI, unless the clock security system is on.
+    /// derived from HSE runs on as if from HSI, unless the clock security system is on.
     pub(crate) fn set_hse(&mut self, hertz: Option<u64>, now: Time) {
         if hertz == self.hse_hertz {
             return;
@@ -380,12 +380,12 @@ impl Rcc {
         field(self.plain.get(CFGR), 0, 2)
     }
 
-    /// The clock tree as it is set now.
+    /// The present clock tree.
     pub(crate) fn clocks(&self) -> Clocks {
         let cfgr = self.plain.get(CFGR);
         let timpre = self.variant == Variant::F446 && bit(self.plain.get(DCKCFGR), 24);
         Clocks {
-            // A PLL with an output of 0 Hz stands still; one hertz is as good.
+            // A PLL with an output of 0 Hz has no edges; one hertz has the same effect.
             hclk: (self.system_clock() / u64::from(ahb_divider(field(cfgr, 4, 4)))).max(1),
             apb1_divider: apb_divider(field(cfgr, 10, 3)),
             apb2_divider: apb_divider(field(cfgr, 13, 3)),

@@ -133,7 +133,7 @@ mod tests {
     };
 
     #[test]
-    fn a_line_from_before_a_change_is_told_until_the_cache_is_emptied() {
+    fn a_line_from_before_a_change_is_reported_until_the_cache_is_emptied() {
         let mut accelerator = Accelerator::new();
         accelerator.load(0x104, FLASH);
         accelerator.fetch(0x100, 4, true, FLASH);
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_waits_for_what_is_being_read() {
+    fn a_jump_waits_for_the_running_read() {
         let mut accelerator = Accelerator::new();
         assert_eq!(accelerator.fetch(0x100, 20, false, FLASH), 9 + 5);
         assert_eq!(accelerator.fetch(0x100, 20, false, FLASH), 0);

@@ -23,7 +23,7 @@ pub(crate) fn fault(code: &[u8], ccr: u32, register: impl Fn(u16) -> u32) -> Opt
     is_unaligned.then_some(cfsr::UNALIGNED)
 }
 
-/// The address of a data access, as far as the instruction tells it: the first one of several, without an offset.
+/// The address of a data access, as far as the instruction names it: the first one of several, without an offset.
 pub(crate) fn accessed(code: &[u8], register: impl Fn(u16) -> u32) -> Option<u32> {
     let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
     let (first, second) = (halves.next()?, halves.next().unwrap_or(0));

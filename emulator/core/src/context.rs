@@ -68,7 +68,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.jump(entry);
     }
 
-    /// Goes on at a vector. One without its lowest bit leaves the Thumb state, in which no instruction runs (ARMv7-M,
+    /// Continues at a vector. A vector without its lowest bit leaves the Thumb state, in which no instruction runs (ARMv7-M,
     /// B1.5.3).
     fn jump(&mut self, vector: u32) {
         self.set(RegisterARM::PC, vector & !1);

@@ -333,7 +333,7 @@ impl<P: Peripherals> Core<P> {
         self.due_is_new();
     }
 
-    /// Computes the next deadline anew.
+    /// Recomputes the next deadline.
     pub(crate) fn due_is_new(&mut self) {
         self.due = self.deadline();
         self.look_again();

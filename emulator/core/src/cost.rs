@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_block_does_besides() {
+    fn a_block_shows_its_use_of_basepri_exclusives_and_floats() {
         let uses = |op: u32| {
             let code: Vec<u8> = [op >> 16, op].iter().flat_map(|half| (*half as u16).to_le_bytes()).collect();
             of_block(&code, Estimate::Modelled, false).uses

@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_instruction_reads_and_leaves() {
+    fn an_instruction_names_the_float_registers_that_it_reads_and_leaves() {
         for (op, left, read, name) in [
             (0xEE30_0A20, Some(0), &[0, 1][..], "vadd.f32 s0, s0, s1"),
             (0xEE71_1A03, Some(3), &[2, 6], "vadd.f32 s3, s2, s6"),

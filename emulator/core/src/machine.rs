@@ -64,7 +64,7 @@ pub struct Machine<P: Peripherals + 'static> {
     pub(crate) watching: Option<UcHookId>,
     /// The program has stopped at a watched point.
     at_point: bool,
-    /// [`Machine::run_until`] comes back after a reset.
+    /// [`Machine::run_until`] returns after a reset.
     stops_at_resets: bool,
     /// The chip was reset since the last look.
     was_reset: bool,

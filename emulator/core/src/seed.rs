@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(stored(Access::Missing, REGISTER + 4, 4, 1), Some(1));
     }
     #[test]
-    fn bits_that_nobody_looks_at_read_as_zero() {
+    fn unseen_bits_read_as_zero() {
         let bugs = Bugs(vec![Bug { register: REGISTER, access: Access::Unseen { bits: 0x0120 } }]);
         assert_eq!(bugs.seen(REGISTER, 0x0FFF), 0x0EDF);
         assert_eq!(bugs.seen(REGISTER + 1, 0x0F), 0x0E);

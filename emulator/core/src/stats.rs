@@ -28,29 +28,29 @@ pub struct Activity {
     pub worst_blocking: Time,
     /// Longest time from the request to the end of the activation that serves it.
     pub worst_response: Time,
-    /// Instant of the first entry.
-    pub first_entry: Time,
-    /// Instant of the latest entry.
-    pub last_entry: Time,
-    /// Shortest time between two entries; zero before the second.
+    /// Instant of the latest entry since the last reset.
+    last_entry: Option<Time>,
+    /// Number of intervals: pairs of entries in a row without a reset between them.
+    pub intervals: u64,
+    /// Sum of the intervals.
+    pub interval_sum: Time,
+    /// Shortest interval; zero before the first.
     pub shortest_interval: Time,
-    /// Longest time between two entries; zero before the second.
+    /// Longest interval; zero before the first.
     pub longest_interval: Time,
 }
 
 impl Activity {
     fn note_entry(&mut self, latency: Time, at: Time) {
         self.worst_latency = self.worst_latency.max(latency);
-        let interval = at.since(self.last_entry);
-        match self.entries {
-            0 => self.first_entry = at,
-            1 => (self.shortest_interval, self.longest_interval) = (interval, interval),
-            _ => {
-                self.shortest_interval = self.shortest_interval.min(interval);
-                self.longest_interval = self.longest_interval.max(interval);
-            }
+        if let Some(last) = self.last_entry.replace(at) {
+            let interval = at.since(last);
+            let shortest = if self.intervals == 0 { interval } else { self.shortest_interval };
+            self.shortest_interval = shortest.min(interval);
+            self.longest_interval = self.longest_interval.max(interval);
+            self.interval_sum += interval;
+            self.intervals += 1;
         }
-        self.last_entry = at;
         self.entries += 1;
     }
 }
@@ -193,10 +193,39 @@ impl Stats {
         activity.worst_response = activity.worst_response.max(at.since(requested));
     }
 
-    /// A reset ends every activation.
+    /// A reset ends every activation. The time until the next entry is no interval.
     pub(crate) fn unwound(&mut self, at: Time) {
         while !self.preempted.is_empty() {
             self.left(at);
         }
+        self.exceptions.iter_mut().for_each(|activity| activity.last_entry = None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reset_is_between_two_series_of_intervals() {
+        let mut stats = Stats::default();
+        let exception = Exception::irq(56);
+        let enter = |stats: &mut Stats, at| {
+            let at = Time::from_millis(at);
+            stats.entered(exception, Entry { requested: at, level: 0, cycle: Time(1) }, at, 0);
+            stats.left(at);
+        };
+        for at in [10, 11, 13] {
+            enter(&mut stats, at);
+        }
+        stats.unwound(Time::from_millis(14));
+        for at in [9000, 9001] {
+            enter(&mut stats, at);
+        }
+        let activity = stats.of(exception);
+        assert_eq!((activity.entries, activity.intervals), (5, 3));
+        assert_eq!(activity.interval_sum, Time::from_millis(4));
+        assert_eq!(activity.shortest_interval, Time::from_millis(1));
+        assert_eq!(activity.longest_interval, Time::from_millis(2));
     }
 }

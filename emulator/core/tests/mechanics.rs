@@ -41,7 +41,7 @@ fn four_contexts_keep_their_floating_point_registers() {
 }
 
 #[test]
-fn an_it_block_goes_on_after_an_exception() {
+fn an_it_block_continues_after_an_exception() {
     shows("it_block", Mechanism::ItState);
 }
 
@@ -62,7 +62,7 @@ fn code_programmed_into_flash_runs() {
 
 /// In all modes: between blocks, between instructions, and with the most cycles.
 #[test]
-fn no_bit_of_flash_comes_back_without_an_erase() {
+fn no_bit_of_flash_is_set_without_an_erase() {
     for (mode, change) in [
         ("the usual one", None::<fn(&mut Bench)>),
         ("interleaved", Some(|bench| bench.machine.interleave(Some(1)).unwrap())),

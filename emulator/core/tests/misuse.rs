@@ -91,7 +91,7 @@ fn a_vector_without_the_thumb_bit_faults() {
 }
 
 #[test]
-fn a_deep_sleep_is_told() {
+fn a_deep_sleep_is_reported() {
     // str r1, [r0]; wfi
     let sleep = |control: u32| program(&[&load(0, SCR), &load(1, control), &[0x6001, 0xBF30]]);
     assert!(rules(&mut sleep(0)).is_empty());
@@ -100,7 +100,7 @@ fn a_deep_sleep_is_told() {
 }
 
 #[test]
-fn a_vector_table_at_a_multiple_of_128_is_told() {
+fn a_vector_table_at_a_multiple_of_128_is_reported() {
     for (address, is_right) in
         [(0x0800_4000, true), (0x0800_4200, true), (0x0800_4080, false), (0x0800_4100, false)]
     {
@@ -148,7 +148,7 @@ fn the_protection_unit_protects_data() {
 }
 
 #[test]
-fn a_guard_that_is_finer_than_a_page_is_told() {
+fn a_guard_that_is_finer_than_a_page_is_reported() {
     for (access, exponent, words) in [(0b000, 5, "less than a kilobyte"), (0b001, 10, "unprivileged")] {
         let told = rules(&mut protected(access, exponent, LOAD));
         assert!(matches!(told[..], [Breach::NotModelled { what }] if what.contains(words)), "{told:?}");
@@ -233,11 +233,11 @@ fn the_cycle_counter_keeps_its_count_when_it_stops() {
     assert!(stopped >= 1600 && machine.debug_read(DWT + 4) == Some(stopped), "{stopped}");
 }
 
-/// A place in flash behind the program: the next one to a constant of it.
+/// A place in flash behind the program, for a constant.
 const CONSTANT: u32 = 0x0804_0000;
 
 #[test]
-fn a_constant_from_before_its_programming_is_told() {
+fn a_constant_from_before_its_programming_is_reported() {
     // ldr r1, [r0]; movs r2, #0; str r2, [r0]; ldr r1, [r0]
     let reads = |again: u16| program(&[&load(0, CONSTANT), &[0x6801, 0x2200, 0x6002, NEXT, again]]);
     let stale = Breach::StaleCache { what: "constants", address: CONSTANT };
@@ -250,7 +250,7 @@ fn a_constant_from_before_its_programming_is_told() {
 }
 
 #[test]
-fn code_from_before_its_programming_is_told() {
+fn code_from_before_its_programming_is_reported() {
     // blx r0, to `bx lr`; strh r2, [r1]; blx r0
     let set_up = [load(0, CONSTANT | 1), load(1, CONSTANT), load(2, 0x4770)].concat();
     let mut machine = program(&[&set_up, &[0x4780, 0x800A, NEXT, 0x4780]]);

@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_shown_where_somebody_can_look() {
+    fn a_page_is_served_where_a_user_can_watch() {
         let page = |flags: &str| read(flags).unwrap().page().map(|(address, _)| address.to_string());
         let usual = Some("127.0.0.1:8301".to_owned());
         assert_eq!(page("--page-program p"), usual);
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_in_one_line() {
+    fn mistakes_are_reported_in_one_line() {
         let wrong = [
             ("--node 0:pressure", "0"),
             ("--node 128:pressure", "128"),

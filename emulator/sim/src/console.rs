@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_and_what_is_none() {
+    fn commands_are_read_and_other_lines_are_rejected() {
         assert!(HELP.contains(&KINDS.join("|")));
         assert_eq!(parse("  "), None);
         assert_eq!(parse(" quit "), Some(Ok(Command::Quit)));

@@ -95,7 +95,7 @@ impl Crew {
 
 impl Job {
     /// # Safety
-    /// Nobody else uses the boards of this share.
+    /// No other thread uses the boards of this share.
     unsafe fn run(&self) -> Time {
         let own = (self.first..self.count).step_by(self.stride);
         // SAFETY: the numbers are below the count, and the boards are this thread's alone. What a board shares with

@@ -19,13 +19,13 @@ const PERIOD: Time = Time::from_millis(1);
 /// Figures of the 1 kHz measurement.
 pub(crate) fn sampling(machine: &Machine<Stm32f4>) -> Sampling {
     let activity = machine.stats().of(SAMPLING);
-    // The intervals are zero before the second sample.
-    let measured = activity.entries > 1;
+    // Without an interval, the shortest and the longest are zero.
+    let measured = activity.intervals > 0;
     let early = if measured { PERIOD.since(activity.shortest_interval) } else { Time::ZERO };
     let late = activity.longest_interval.since(PERIOD);
     Sampling {
         samples: activity.entries,
-        rate: per_second(activity.entries.saturating_sub(1), activity.last_entry.since(activity.first_entry)),
+        rate: per_second(activity.intervals, activity.interval_sum),
         worst_jitter: early.max(late).as_secs_f64() * 1e6,
         instructions: mean(activity.instructions, activity.entries),
     }

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_of_what_was_counted() {
+    fn shares_of_the_counted_time() {
         let time = HostTime([3, 0, 1, 0, 0].map(Duration::from_secs));
         assert_eq!(time.to_string(), "boards 75.0 %, waiting 0.0 %, bus 25.0 %, clients 0.0 %, output 0.0 %");
         assert_eq!(

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_image_is_an_error_of_one_line() {
+    fn a_file_without_an_image_is_an_error_of_one_line() {
         for bytes in [&b""[..], b"\x7fELF", b"#!/bin/sh\n"] {
             let error = Image::parse("x", bytes.to_vec()).err().unwrap();
             assert!(!format!("{error:#}").contains('\n'));

@@ -73,9 +73,9 @@ pub struct NodeSummary {
 pub struct Sampling {
     /// Number of samples: starts of the sampling task.
     pub samples: u64,
-    /// Samples per second, from the first to the last.
+    /// Samples per second while the application runs.
     pub rate: f64,
-    /// Largest deviation of a start from its due millisecond, in microseconds.
+    /// Largest deviation of the time between two starts from a millisecond, in microseconds. A restart of the application is left out.
     pub worst_jitter: f64,
     /// Average instructions of one sample.
     pub instructions: f64,

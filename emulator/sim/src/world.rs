@@ -72,11 +72,11 @@ pub struct World {
     enforces_rules: bool,
     stimuli_changes: u64,
     observer: Option<Box<dyn Observer>>,
-    /// What the observer knows of each board.
+    /// The observer's knowledge of each board.
     observed: Vec<Observed>,
 }
 
-/// What an observer knows of a board.
+/// An observer's knowledge of a board.
 #[derive(Clone, Copy)]
 struct Observed {
     incidents: usize,

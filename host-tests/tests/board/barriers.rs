@@ -17,7 +17,7 @@ const PWR_CR: u32 = 0x4000_7000;
 const STARTED: Time = Time::from_millis(600);
 const ROUNDS: u8 = 10;
 
-/// What a run says: the entries of each task, and all that an engineer would notice.
+/// The result of a run: the entries of each task, and every deviation that an engineer would notice.
 #[derive(Debug, PartialEq)]
 struct Said {
     entries: [u64; TASKS.len()],

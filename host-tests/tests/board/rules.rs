@@ -25,7 +25,7 @@ fn a_broken_rule_fails_the_run() {
 }
 
 #[test]
-fn a_broken_rule_is_told_with_its_place_in_the_source() {
+fn a_broken_rule_is_reported_with_its_place_in_the_source() {
     let mut world = world("--bitrate 1000");
     let access = Access::Wrong { bits: 0xF, value: 0 };
     world.machine(0).seed(Bug { register: FLASH_ACR, access });

@@ -4,7 +4,7 @@ use canbus::{Stamped, Time};
 
 use crate::support::{Master, START_ALL, world};
 
-/// What can be seen of a run from outside, and the work of each board.
+/// The frames and the log of a run, and the work of each board.
 fn run(flags: &str, threads: usize) -> (Vec<Stamped>, Vec<String>, Vec<u64>) {
     let mut world = world(&format!("--bitrate 1000 {flags} --threads {threads}"));
     let master = Master::join(&mut world);

@@ -40,7 +40,7 @@ fn every_file_is_read_and_its_mistakes_are_named_with_their_lines() {
 }
 
 #[test]
-fn what_is_read_can_be_written_and_read_again() {
+fn a_sheet_that_is_read_can_be_written_and_read_again() {
     for (name, bytes) in files() {
         let sheet = Eds::from_bytes(&bytes).expect("a sheet");
         let again = Eds::parse(&sheet.to_dcf(&name, Reals::Decimal)).expect("a sheet");

@@ -45,8 +45,8 @@ impl Boot {
         self.since.is_some()
     }
 
-    /// Whether a boot-up message may be next although no restart was seen: the first one, or that of a node which was told
-    /// to restart itself.
+    /// Whether a boot-up message may be next although no restart was seen: the first one, or that of a node with a command
+    /// to restart.
     pub(crate) fn may_be_starting(&self) -> bool {
         !self.has_booted || self.has_reason || self.is_updated
     }

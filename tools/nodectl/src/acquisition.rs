@@ -100,6 +100,8 @@ pub struct Acquisition<'n> {
     is_own: bool,
     /// The number of frames of all nodes.
     frames: u64,
+    /// Whether a value has come.
+    has_values: bool,
 }
 
 impl<'n> Acquisition<'n> {
@@ -132,6 +134,7 @@ impl<'n> Acquisition<'n> {
             emergency: None,
             is_own: catalogue.is_of_this_project(),
             frames: 0,
+            has_values: false,
         })
     }
 
@@ -148,6 +151,21 @@ impl<'n> Acquisition<'n> {
         let has_mapped = self.signals.iter().any(|signal| signal.tpdo.is_some());
         let (node, state) = (self.setup.node.get(), heartbeat::words(state));
         has_mapped.then(|| format!("node {node} is {state} and sends no TPDOs; --start starts it"))
+    }
+
+    /// The TPDOs that are awaited: `waiting for TPDO 1 (181h), TPDO 2 (281h) of node 1`. `None` once a value has come.
+    #[must_use]
+    pub fn awaited(&self) -> Option<String> {
+        let is_followed = |tpdo: &&Tpdo| self.signals.iter().any(|signal| signal.tpdo == Some(tpdo.number));
+        let tpdos = self.tpdos.iter().filter(is_followed);
+        let names: Vec<String> =
+            tpdos.map(|tpdo| format!("TPDO {} ({:03X}h)", tpdo.number, tpdo.id)).collect();
+        let node = self.setup.node.get();
+        let text = match names[..] {
+            [] => format!("node {node} has no TPDO that is switched on and maps a value"),
+            _ => format!("waiting for {} of node {node}", names.join(", ")),
+        };
+        (!self.has_values).then_some(text)
     }
 
     /// The node that is followed.
@@ -204,6 +222,7 @@ impl<'n> Acquisition<'n> {
                 None => (),
             }
         }
+        self.has_values |= !self.ready.is_empty();
         Ok(self.ready.pop_front())
     }
 

@@ -3,6 +3,7 @@
 use canopen::emcy::Message;
 use canopen::sdo::Multiplexer;
 
+use crate::object::at;
 use crate::unit::symbol;
 use crate::update::{Event, Log};
 use crate::value::Value;
@@ -22,7 +23,7 @@ pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<Strin
     if at.index == 0x1003 && at.sub > 0 {
         let [low, high, detail, _] = u32::try_from(*number).ok()?.to_le_bytes();
         let code = u16::from_le_bytes([low, high]);
-        return Some(format!("{code:04X}h {}", error_name(code, detail, catalogue.is_of_this_project())));
+        return Some(format!("{code:04X}h {}", listed_error(code, detail, catalogue)));
     }
     if (at.index, at.sub) == (0x2002, 1) && catalogue.is_of_this_project() {
         return trial(*number).map(str::to_owned);
@@ -143,6 +144,25 @@ pub fn error_name(code: u16, detail: u8, is_own: bool) -> &'static str {
     own.map_or_else(|| error_code(code), |row| row.name.as_str())
 }
 
+/// Objects of the sensors: the limits of the pressure sensor, the frame of the encoder.
+const SENSORS: [(u16, &[u8]); 2] = [(0x2200, &[0]), (0x2103, &[1, 2])];
+
+/// An error of the list 1003h in words. The list of a node of this project has no error field, so an error with several
+/// causes has the names of all causes that are possible with the sensors in the data sheet.
+#[must_use]
+pub fn listed_error(code: u16, detail: u8, catalogue: &Catalogue) -> String {
+    let is_own = catalogue.is_of_this_project();
+    let sensors = SENSORS.iter().filter(|(index, _)| catalogue.entry(at(*index, 0)).is_some());
+    let details = sensors.flat_map(|(_, details)| details.iter().copied());
+    let has_several =
+        explain::emergency(code, 1).map(|row| &row.name) != explain::emergency(code, 0).map(|row| &row.name);
+    let mut names: Vec<&str> = Vec::new();
+    if is_own && detail == 0 && has_several {
+        names.extend(details.map(|detail| error_name(code, detail, true)));
+    }
+    if names.is_empty() { error_name(code, detail, is_own).to_owned() } else { names.join(", or ") }
+}
+
 /// An emergency error code in words (CiA 301).
 #[must_use]
 pub fn error_code(code: u16) -> &'static str {
@@ -152,7 +172,6 @@ pub fn error_code(code: u16) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::object::at;
 
     #[test]
     fn codes_in_words() {
@@ -166,6 +185,25 @@ mod tests {
         ] {
             assert_eq!(error_code(code), words, "{code:04X}h");
         }
+    }
+
+    #[test]
+    fn an_error_of_the_list_has_the_names_of_the_causes_that_the_device_can_have() {
+        for (file, expected) in [
+            ("pressure.eds", "sensor break"),
+            ("encoder.eds", "encoder does not answer, or position of the encoder is wrong"),
+            ("combined.eds", "sensor break, or encoder does not answer, or position of the encoder is wrong"),
+            ("lift.eds", "sensor break, or encoder does not answer, or position of the encoder is wrong"),
+        ] {
+            let catalogue = Catalogue::of_file(file).expect("a data sheet");
+            assert_eq!(listed_error(0x5006, 0, &catalogue), expected, "{file}");
+            assert_eq!(listed_error(0x5006, 2, &catalogue), "position of the encoder is wrong");
+            assert_eq!(listed_error(0x6300, 0, &catalogue), "stored calibration is damaged");
+            assert_eq!(listed_error(0x8130, 0, &catalogue), "heartbeat of a watched node is missing");
+            assert_eq!(listed_error(0x4711, 0, &catalogue), "not defined by CiA 301");
+        }
+        let unknown = Catalogue::unknown();
+        assert_eq!(listed_error(0x5006, 0, &unknown), "device hardware");
     }
 
     #[test]

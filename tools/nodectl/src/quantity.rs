@@ -6,6 +6,7 @@ use eds::{Class, DataType};
 use crate::Catalogue;
 use crate::object::at;
 use crate::sdo::{Client, Error};
+use crate::text::visible;
 use crate::unit::symbol;
 use crate::value::{Value, ValueError};
 
@@ -78,7 +79,11 @@ impl Quantity {
         let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
         let factor = format!("{whole}{fraction}").parse::<u32>().unwrap_or(1).saturating_mul(steps);
         let digits = u32::try_from(fraction.len()).unwrap_or(0);
-        let (unit, digits) = if unit == "um" { ("mm", digits + 3) } else { (unit, digits) };
+        let (unit, digits) = match unit {
+            "um" => ("mm", digits + 3),
+            "us" => ("ms", digits + 3),
+            unit => (unit, digits),
+        };
         Quantity { unit: unit.to_owned(), scale: Scale::new(factor, digits) }
     }
 
@@ -138,6 +143,31 @@ impl Scale {
     }
 }
 
+/// A value with its unit, and `hexadecimal` between them. A number of steps such as `100 us` has the product behind it:
+/// `100 x 100 us (10 ms)`. The number that `write` takes is in front.
+#[must_use]
+pub(crate) fn with_unit(value: &Value, hexadecimal: &str, unit: &str) -> String {
+    let number = visible(&value.to_string());
+    match (steps(value, unit), unit) {
+        (Some(zero), _) if *value == Value::Integer(0) => zero,
+        (Some(product), unit) => format!("{number} x {unit} ({product})"),
+        (None, "") => format!("{number}{hexadecimal}"),
+        (None, unit) => format!("{number}{hexadecimal} {unit}"),
+    }
+}
+
+/// The product of a number and a unit such as `100 us`; `None` for any other unit, as `ms` or `1/K`.
+fn steps(value: &Value, unit: &str) -> Option<String> {
+    let (step, _) = unit.split_once(' ')?;
+    step.parse::<f64>().ok().filter(|step| *step > 0.0)?;
+    let Value::Integer(_) = value else { return None };
+    let quantity = Quantity::of_steps(1, unit);
+    let number = quantity.apply(value.clone()).to_string();
+    let number =
+        if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
+    Some(format!("{number} {}", quantity.unit))
+}
+
 /// The object with the decimal digits of an integer: the object beside the unit, if its name in the data sheet says so.
 fn digits_object(catalogue: &Catalogue, unit: u16, of: Multiplexer) -> Option<Multiplexer> {
     let object = at(unit.checked_add(1)?, of.sub);
@@ -193,6 +223,25 @@ mod tests {
             let value = quantity.apply(Value::Integer(number));
             assert_eq!(format!("{value} {}", quantity.unit), text);
         }
+    }
+
+    #[test]
+    fn a_number_of_steps_is_shown_as_their_product() {
+        for (number, unit, text) in [
+            (100, "100 us", "100 x 100 us (10 ms)"),
+            (25, "100 us", "25 x 100 us (2.5 ms)"),
+            (0, "100 us", "0 ms"),
+            (12345, "0.1 h", "12345 x 0.1 h (1234.5 h)"),
+            (-7, "0.1 mm/s", "-7 x 0.1 mm/s (-0.7 mm/s)"),
+            (1000, "ms", "1000 ms"),
+            (3, "1/K", "3 1/K"),
+            (3, "steps or nm", "3 steps or nm"),
+            (3, "", "3"),
+        ] {
+            assert_eq!(with_unit(&Value::Integer(number), "", unit), text);
+        }
+        assert_eq!(with_unit(&Value::Integer(16), " (00000010h)", "us"), "16 (00000010h) us");
+        assert_eq!(with_unit(&Value::Text("a\u{1b}".to_owned()), "", ""), "a\\x1b");
     }
 
     #[test]

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame() {
+    fn texts_that_are_no_frames_are_rejected() {
         for text in [
             "",
             "t",

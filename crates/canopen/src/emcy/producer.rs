@@ -213,8 +213,8 @@ impl Producer {
 
     fn report(&mut self, code: u16, detail: [u8; 5], now: Tick) {
         let message = Message { code, register: self.register(), detail };
-        // In a full queue, the message replaces the newest one. The older messages tell how the trouble began; this
-        // message tells the present state.
+        // In a full queue, the message replaces the newest one. The older messages report the first faults; this
+        // message reports the present state.
         self.waiting.push(message.encode());
         self.due = self.due.min(self.next_due(now));
     }

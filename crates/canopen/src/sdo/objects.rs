@@ -71,7 +71,7 @@ pub(super) struct Source {
     part: Option<usize>,
 }
 
-/// An offset beyond every domain: the buffer has no part of it.
+/// An offset beyond every domain: the buffer contains no part of one.
 const NO_PART: usize = usize::MAX;
 
 impl Source {

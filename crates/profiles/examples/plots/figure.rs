@@ -31,10 +31,25 @@ pub(crate) struct Curve {
     pub(crate) points: Trace,
 }
 
+/// The colours of a plot on a dark page. The rules of a style precede the attributes of the drawing.
+const DARK: &str = r##"<style>
+@media (prefers-color-scheme: dark) {
+  [fill="#FFFFFF"] { fill: #0d1117 }
+  [stroke="#FFFFFF"] { stroke: #0d1117 }
+  [fill="#000000"] { fill: #e6edf3 }
+  [stroke="#000000"] { stroke: #c9d1d9 }
+  [stroke="#285AC8"] { stroke: #6cb6ff }
+  [stroke="#C82828"] { stroke: #ff7b72 }
+}
+</style>
+"##;
+
 /// The plot as SVG text.
 pub(crate) fn svg(charts: &[Chart]) -> String {
     let mut text = String::new();
     draw(charts, &mut text).expect("a string takes everything");
+    let head = text.find('\n').map_or(0, |end| end + 1);
+    text.insert_str(head, DARK);
     text
 }
 

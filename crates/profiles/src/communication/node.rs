@@ -65,7 +65,7 @@ const fn fact(sub: u8, name: &'static str, kind: Type) -> Object {
 }
 
 /// 2004h: facts about the board and its programs, for the master of an update. Programs are named by their identification,
-/// as in 1F56h; 0 is none.
+/// as in 1F56h; 0 without a program.
 pub const PROGRAM_STATE_ROWS: &[Object] = &[
     Object::highest(PROGRAM_STATE, 7, "Program state"),
     fact(1, "Board", Type::Unsigned32).value(crate::product::BOARD as i64),

@@ -41,7 +41,7 @@ pub(crate) trait Device {
     fn restart(&mut self, reset: Reset);
 }
 
-/// What a reset leaves of the retained words, and the record about them.
+/// The retained words after a reset, and the record about them.
 fn kept(words: [u32; RETAINED_WORDS], reset: Reset) -> (Retained, Option<[u32; POSITION_RECORD_WORDS]>) {
     let retained = if reset == Reset::NoBattery { Retained::Nothing } else { Retained::Words(words) };
     (retained, Some(PositionRecord::of(&words).to_words()))
@@ -65,7 +65,7 @@ fn parameters(case: &Case) -> Parameters {
     parameters
 }
 
-/// What measures the shaft: the encoder alone, or the module of an encoder and a transmitter.
+/// A device that measures the shaft: the encoder alone, or the module of an encoder and a transmitter.
 pub(crate) trait Chained {
     fn start(words: Retained, record: Option<[u32; POSITION_RECORD_WORDS]>) -> Self;
     fn apply(&mut self, parameters: &Parameters);
@@ -123,7 +123,7 @@ impl Chained for Combined {
 pub(crate) struct EncoderDevice<E> {
     encoder: E,
     parameters: Parameters,
-    /// What the parameter store holds.
+    /// The content of the parameter store.
     stored: Parameters,
 }
 

@@ -281,7 +281,7 @@ impl<D: Device> World<D> {
         }
     }
 
-    /// What a user does with a condemned position: a request first, which is enough where the code is, then a preset.
+    /// The remedy of a user for a condemned position: a request, which is enough where the code is, then a preset.
     fn recover(&mut self) {
         self.rest(2);
         let is_to_be_believed =

@@ -104,7 +104,7 @@ fn wear(rounds: u32, intervals: u8, program: fn(&mut Node, u32)) -> u32 {
 fn hostile_programs_wear_a_sector_no_faster_than_the_budget_allows() {
     let burst = u32::from(Clears::BURST);
     for (name, seconds, program) in HOSTILE {
-        // An interval is much longer than a round, so a budget with one in each round is none.
+        // An interval is much longer than a round, so a budget with one in each round limits nothing.
         let free = wear(20, 1, program);
         let most = wear(2 * burst, 0, program);
         if free <= 1 {

@@ -235,7 +235,7 @@ impl Flash {
         self.acr = value & 0x1F0F;
     }
 
-    /// A write during an operation waits for the end of it (RM0390 section 3.8.4).
+    /// A write during an operation waits for its end (RM0390 section 3.8.4).
     fn write_control(&mut self, value: u32, now: Time, effects: &mut VecDeque<Effect>) {
         self.end_work(effects);
         if effects.back() == Some(&Effect::PowerCut) {

@@ -202,7 +202,7 @@ fn told(program: fn(&mut Rig, bool), wrong: bool) -> String {
 }
 
 #[test]
-fn every_mistake_is_told_by_its_rule() {
+fn every_mistake_is_reported_by_its_rule() {
     for (name, program, says) in ROWS {
         assert_eq!(told(*program, false), "", "{name}, done right");
         assert!(told(*program, true).contains(says), "{name}: {:?}", told(*program, true));

@@ -184,7 +184,7 @@ fn numbers_count_inactive_banks_for_each_fifo() {
 }
 
 #[test]
-fn what_protects_the_filters() {
+fn filters_are_written_only_where_their_lock_allows() {
     let mut rig = Rig::new(1, 0);
     rig.write(0, FMR, 0x0E00);
     rig.write(0, FM1R, 1);

@@ -23,7 +23,7 @@ struct Lines {
     kinds: String,
 }
 
-/// Writes the TPDOs of these nodes as they are configured. A node that does not answer or refuses is left out, and is an
+/// Writes the configured TPDOs of these nodes. A node that does not answer or refuses is left out, and is an
 /// error at the end. Without any node nothing is written.
 pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Result<(), Failure> {
     let (mut all, mut names, mut failures) = (Lines::default(), Vec::new(), Vec::new());

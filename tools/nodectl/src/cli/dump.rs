@@ -186,7 +186,7 @@ impl Apply {
     }
 }
 
-/// Tells the user that a file is of another node-ID.
+/// Warns the user of a file of another node-ID.
 fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
     if let Some(of_file) = node_of(sheet).filter(|of_file| *of_file != node) {
         let (of_file, node) = (of_file.get(), node.get());
@@ -196,7 +196,7 @@ fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
     }
 }
 
-/// Tells the user that a data sheet does not say which entries are parameters.
+/// Warns the user of a data sheet that does not mark its parameters.
 fn note_unclear(sheet: &Eds) {
     let count = sheet.entries().filter(|entry| is_unclear(entry)).count();
     if count > 0 {

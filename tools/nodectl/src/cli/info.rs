@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::output::hex;
 use super::{Failure, Session};
+use crate::Catalogue;
 use crate::heartbeat;
 use crate::meaning;
 use crate::object::at;
@@ -39,9 +40,9 @@ struct Report {
     error_register: Option<u32>,
     errors: Vec<u32>,
     program: Option<ProgramReport>,
-    /// Whether the node is one of this project, whose errors have names of their own.
+    /// The errors in words.
     #[serde(skip)]
-    is_own: bool,
+    error_names: Vec<String>,
 }
 
 /// The program of a node that can be updated (CiA 302-3).
@@ -81,6 +82,8 @@ impl Info {
 
 fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
     let heartbeat_ms = number(session, node, 0x1017, 0)?;
+    let errors = errors(session, node)?;
+    let catalogue = session.catalogue(node)?;
     Ok(Report {
         node: node.get(),
         device_type: number(session, node, 0x1000, 0)?,
@@ -94,9 +97,9 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
         heartbeat_ms,
         state: state(session, node, heartbeat_ms)?,
         error_register: number(session, node, 0x1001, 0)?,
-        errors: errors(session, node)?,
+        error_names: errors.iter().map(|&error| error_text(error, &catalogue)).collect(),
+        errors,
         program: program(session, node)?,
-        is_own: session.catalogue(node)?.is_of_this_project(),
     })
 }
 
@@ -116,6 +119,13 @@ fn errors(session: &mut Session, node: NodeId) -> Result<Vec<u32>, Failure> {
         errors.extend(number(session, node, 0x1003, sub)?);
     }
     Ok(errors)
+}
+
+/// An error of the list in words. CiA 301, 7.5.2.4: the low half is the error code, the high half is the manufacturer's.
+fn error_text(error: u32, catalogue: &Catalogue) -> String {
+    let [low, high, detail, _] = error.to_le_bytes();
+    let code = u16::from_le_bytes([low, high]);
+    format!("{code:04X}h {}, {:04X}h", meaning::listed_error(code, detail, catalogue), error >> 16)
 }
 
 fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>, Failure> {
@@ -190,12 +200,8 @@ impl fmt::Display for Report {
         write!(f, "\n  state             {}", self.state.unwrap_or("- (no heartbeat)"))?;
         let register = self.error_register.map_or_else(|| "-".to_owned(), |value| format!("{value:02X}h"));
         write!(f, "\n  error register    {register}")?;
-        for error in &self.errors {
-            // CiA 301, 7.5.2.4: the low half is the error code, the high half is the manufacturer's.
-            let [low, high, detail, _] = error.to_le_bytes();
-            let code = u16::from_le_bytes([low, high]);
-            let name = meaning::error_name(code, detail, self.is_own);
-            write!(f, "\n  error             {code:04X}h {name}, {:04X}h", error >> 16)?;
+        for text in &self.error_names {
+            write!(f, "\n  error             {text}")?;
         }
         self.program.iter().try_for_each(|program| write!(f, "\n  program           {program}"))
     }

@@ -27,7 +27,7 @@ pub(super) struct Map {
     #[arg(required_unless_present = "dbc", value_name = "OBJECT")]
     objects: Vec<String>,
 
-    /// Write the TPDOs of the nodes as they are to a DBC file instead ("-" for the standard output).
+    /// Write the present TPDOs of the nodes to a DBC file instead ("-" for the standard output).
     #[arg(long, value_name = "FILE", conflicts_with_all = ["direction", "number", "objects"])]
     dbc: Option<PathBuf>,
 

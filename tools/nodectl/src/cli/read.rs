@@ -12,9 +12,8 @@ use serde::{Serialize, Serializer};
 use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::object::Place;
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, with_unit};
 use crate::sdo::AbortCode;
-use crate::text::visible;
 use crate::value::{Value, data_type, guess};
 use crate::{Catalogue, meaning};
 
@@ -204,8 +203,7 @@ impl Reading {
     /// The value with its unit and its meaning.
     pub(super) fn value_text(&self) -> String {
         let meaning = self.meaning.as_ref().map(|meaning| format!(" [{meaning}]")).unwrap_or_default();
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        format!("{}{unit}{meaning}", visible(&self.value.to_string()))
+        format!("{}{meaning}", with_unit(&self.value, "", &self.unit))
     }
 
     /// The value in the form of JSON.
@@ -261,14 +259,14 @@ impl fmt::Display for Reading {
         if let Some(name) = &self.name {
             write!(f, "{name} ")?;
         }
-        write!(f, "= {}", visible(&self.value.to_string()))?;
         // Identifiers, units and mappings are also shown in hexadecimal, because people read them digit by digit.
-        if let (Value::Integer(value), Class::Unsigned(bits @ 32..)) = (&self.value, self.class) {
-            write!(f, " ({value:0width$X}h)", width = usize::from(bits / 4))?;
-        }
-        if !self.unit.is_empty() {
-            write!(f, " {}", self.unit)?;
-        }
+        let hexadecimal = match (&self.value, self.class) {
+            (Value::Integer(value), Class::Unsigned(bits @ 32..)) => {
+                format!(" ({value:0width$X}h)", width = usize::from(bits / 4))
+            }
+            _ => String::new(),
+        };
+        write!(f, "= {}", with_unit(&self.value, &hexadecimal, &self.unit))?;
         self.meaning.iter().try_for_each(|meaning| write!(f, " [{meaning}]"))
     }
 }

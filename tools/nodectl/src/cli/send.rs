@@ -10,7 +10,7 @@ use super::{Failure, Session};
 use crate::text::counted;
 use crate::trace::{LogReader, Record};
 
-/// Sends frames as they are: a SYNC (080#), an RPDO, an NMT command. The frames are in the form of candump and cansend.
+/// Sends single frames: a SYNC (080#), an RPDO, an NMT command. The frames are in the form of candump and cansend.
 #[derive(Debug, Args)]
 pub(super) struct Send {
     /// CAN-ID in hexadecimal digits, "#" and up to eight bytes: 080#, 201#0102, 000#0105.

@@ -13,7 +13,7 @@ use crate::update::{Decision, Program, decide};
 #[derive(Debug, Args)]
 pub(super) struct Confirm {}
 
-/// Takes the program on trial back (2002h): the node restores the previous one.
+/// Rolls the program on trial back (2002h): the node restores the previous one.
 #[derive(Debug, Args)]
 pub(super) struct Rollback {}
 

@@ -1,4 +1,4 @@
-//! What a file wants of each node: its identity, and the values of its parameters.
+//! The settings in a file for each node: its identity, and the values of its parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ const CAN_ID: i128 = 0x7FF;
 /// Bit 31 of a COB-ID: off.
 const OFF: i128 = 1 << 31;
 
-/// A bus as it is to be.
+/// The intended state of a bus.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The start of the nodes.
@@ -28,12 +28,12 @@ pub struct Plan {
     pub nodes: Vec<PlannedNode>,
 }
 
-/// A node as it is to be.
+/// The intended state of a node.
 #[derive(Clone, Debug)]
 pub struct PlannedNode {
     /// The node-ID.
     pub node: NodeId,
-    /// What the file says.
+    /// The entry of the file.
     pub member: Member,
     /// The data sheet of the file; `None` where the identity of the node decides.
     pub catalogue: Option<Arc<Catalogue>>,
@@ -50,7 +50,7 @@ pub enum PlanError {
     /// Two nodes have the same node-ID.
     #[error("node {0} is there twice")]
     Twice(u8),
-    /// A value is none of the object.
+    /// A value does not fit its object.
     #[error("node {node}: {reason}")]
     Value {
         /// The node.
@@ -122,7 +122,7 @@ impl PlannedNode {
     /// guarding, and single values. The date of the configuration is not among them where the file has one.
     ///
     /// # Errors
-    /// An object is not in the data sheet, or a value is none of the object.
+    /// An object is not in the data sheet, or a value does not fit its object.
     pub fn wanted(&self, catalogue: &Catalogue) -> Result<Configuration, PlanError> {
         let mut wanted = self.of_file();
         let mut single: Vec<(String, String)> = Vec::new();

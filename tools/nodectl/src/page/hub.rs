@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_so_many_places_and_who_leaves_makes_room() {
+    fn places_are_limited_and_a_closed_page_makes_room() {
         let hub = Hub::default();
         let pages: Vec<PageId> = (0..READERS).map(|_| hub.enter(false).unwrap().0).collect();
         assert!(hub.enter(false).is_none());

@@ -1,4 +1,4 @@
-//! The places for connections that are no WebSocket yet. A new connection always gets a place: when there is none left, the
+//! The places for connections that are no WebSocket yet. A new connection always gets a place: when no place is left, the
 //! oldest connection that has not shown the token is closed.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

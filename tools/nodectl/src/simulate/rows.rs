@@ -34,7 +34,7 @@ pub struct Table {
     pub dictionary: &'static Dictionary,
     /// Values that no row can have as a default: texts of 16-bit characters, and bytes.
     pub values: Vec<((u16, u8), Vec<u8>)>,
-    /// What is left out or changed, in words.
+    /// Omissions and changes, in words.
     pub notes: Vec<String>,
 }
 
@@ -252,7 +252,7 @@ fn default(formula: Option<&Formula>, kind: Type, node: NodeId, usual: DefaultVa
     }
 }
 
-/// The limits of an entry, where they are narrower than the type. A limit of a larger type is none.
+/// The limits of an entry, where they are narrower than the type. A limit of a larger type is ignored.
 fn limits(entry: &Entry, kind: Type, node: NodeId) -> Option<(i64, i64)> {
     let (min, max) = kind.range().filter(|_| kind.size() <= 4)?;
     let limit = |formula: &Option<Formula>, otherwise: i64| match formula.as_ref()?.evaluate(node) {

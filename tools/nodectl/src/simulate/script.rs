@@ -18,7 +18,7 @@ use crate::Catalogue;
 use crate::object::Place;
 use crate::value::Value;
 
-/// What a line does.
+/// The effect of a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Deed {
     /// An object gets this value.

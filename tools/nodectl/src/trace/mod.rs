@@ -18,6 +18,7 @@ pub use knowledge::Knowledge;
 pub use log::{Foreign, ForeignKind, LogReader, NotARecord, Record};
 
 use crate::Catalogue;
+use crate::quantity::with_unit;
 use crate::text::hex_digits;
 use crate::value::Value;
 use pdo::Pdos;
@@ -201,9 +202,8 @@ impl Decoder {
 /// A value as people read it: ` = 3.25 bar`; empty without a value.
 fn equals(shown: &Shown) -> String {
     let Some(value) = &shown.value else { return String::new() };
-    let unit = if shown.unit.is_empty() { String::new() } else { format!(" {}", shown.unit) };
     let meaning = shown.meaning.as_ref().map(|meaning| format!(" [{meaning}]")).unwrap_or_default();
-    format!(" = {value}{unit}{meaning}")
+    format!(" = {}{meaning}", with_unit(value, "", &shown.unit))
 }
 
 /// The data of a frame as pairs of digits.

@@ -1,6 +1,10 @@
 //! Tests of scaled values: units, decimal digits, words. Also of hints in error messages.
 
+use canopen::{Duration, NodeId};
 use node::Personality;
+use nodectl::Catalogue;
+use nodectl::acquisition::{Acquisition, Setup};
+use nodectl::sdo::Options;
 
 use crate::commands::{failed, printed, run};
 use crate::pressure::Pressure;
@@ -112,4 +116,36 @@ fn a_refusal_has_a_hint() {
     let file = format!("{}/elf", env!("CARGO_TARGET_TMPDIR"));
     std::fs::write(&file, b"\x7fELF and more").expect("a file");
     assert!(failed(&wire, &["update", &file]).1.contains("firmware.img"));
+}
+
+/// An inhibit time has a unit of 100 us (1015h, 1800h:3).
+#[test]
+fn an_inhibit_time_is_shown_in_milliseconds_too() {
+    let wire = Wire::new(Pressure::new(1));
+    printed(&wire, &["write", "1015", "100"]);
+    assert_eq!(
+        printed(&wire, &["read", "1015"]).trim_end(),
+        "1015h:0 Inhibit time EMCY = 100 x 100 us (10 ms)"
+    );
+    let value = json(&printed(&wire, &["--json", "read", "1015"]));
+    assert_eq!((value["value"].as_i64(), value["unit"].as_str()), (Some(100), Some("100 us")));
+}
+
+#[test]
+fn an_acquisition_names_the_tpdos_that_it_waits_for_until_a_value_arrives() {
+    let wire = Wire::new(Pressure::new(1));
+    let mut network = wire.network();
+    let catalogue = Catalogue::of_file("pressure.eds").expect("a data sheet");
+    let setup = Setup {
+        node: NodeId::new(1).expect("a node-ID"),
+        options: Options::default(),
+        period: Duration::from_millis(100),
+        start: false,
+    };
+    let mut acquisition = Acquisition::open(&mut network, setup, &catalogue, &[]).expect("an acquisition");
+    let waits = "waiting for TPDO 1 (181h) of node 1";
+    assert_eq!(acquisition.awaited().as_deref(), Some(waits));
+    let until = acquisition.now() + Duration::from_millis(3000);
+    assert!(acquisition.next(until).expect("a bus").is_none(), "the node is not Operational");
+    assert_eq!(acquisition.awaited().as_deref(), Some(waits));
 }

@@ -207,7 +207,7 @@ fn a_date_spares_the_comparison_and_is_written_last() {
 }
 
 #[test]
-fn the_watch_configures_and_starts_a_node_that_comes_back() {
+fn the_watch_configures_and_starts_a_node_that_returns() {
     let wire = Wire::new(devices(3));
     let file = file("watched.yaml", 3, |_| "", |_| "");
     printed(&wire, &["net", "apply", file.to_str().unwrap()]);

@@ -43,7 +43,7 @@ fn a_refusal_names_node_object_and_reason() {
 }
 
 #[test]
-fn nobody_answers() {
+fn a_request_without_an_answer_times_out() {
     let mut network = Wire::new(Pressure::new(5)).network();
     let start = network.now();
     let error = client(&mut network, 6).upload(at(0x1000, 0)).unwrap_err();

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flags_choose_what_changes() {
+    fn the_flags_choose_the_changed_bytes() {
         let new = OptionBytes::FACTORY;
         let both = new.with_bootloader(true).with_read_out(true);
         assert_eq!(cli("").change(new), new);

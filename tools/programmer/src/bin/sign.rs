@@ -33,9 +33,9 @@ enum Command {
     Public {
         /// The secret key, PKCS#8 in PEM
         file: PathBuf,
-        /// The rank of the key in the bootloader
-        #[arg(long, value_enum, default_value = "release")]
-        rank: RankName,
+        /// The rank of the key in the bootloader, which selects the variable; the file does not contain it
+        #[arg(long, value_enum)]
+        rank: Option<RankName>,
     },
     /// Certify a release key with the root key, or a root key with the recovery key
     KeyList(KeyListArgs),
@@ -98,7 +98,7 @@ struct KeyListArgs {
 struct ImageArgs {
     /// The ELF file, or the binary from 0x08020200 on
     file: PathBuf,
-    /// The secret key, PKCS#8 in PEM [default: the development key, which is known to everybody]
+    /// The secret key, PKCS#8 in PEM [default: the development key, which is published in the repository]
     #[arg(long)]
     key: Option<PathBuf>,
     /// The board that the image is for, as in 2004h:1
@@ -132,7 +132,7 @@ fn signing_key(path: Option<&Path>) -> Result<ed25519_dalek::SigningKey> {
     let development = key::development_path();
     let key = key::read(path.unwrap_or(&development))?;
     if key::is_development(&key) {
-        eprintln!("warning: the development key is known to everybody");
+        eprintln!("warning: the development key is published in this repository, so anyone can sign with it");
     }
     Ok(key)
 }
@@ -146,6 +146,14 @@ fn make_key(path: &Path, rank: RankName) -> Result<()> {
     key::write(&key, path)?;
     println!("{}", key::variable(&key, rank.into()));
     Ok(())
+}
+
+/// The variable of a rank; without a rank, the digits after a neutral name.
+fn public_line(key: &ed25519_dalek::SigningKey, rank: Option<RankName>) -> String {
+    match rank {
+        Some(rank) => key::variable(key, rank.into()),
+        None => format!("PUBLIC_KEY={}", key::public_digits(key)),
+    }
 }
 
 fn read_key_list(path: Option<&Path>) -> Result<KeyList> {
@@ -230,9 +238,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Key { file, rank } => make_key(&file, rank),
         Command::KeyList(args) => make_key_list(&args),
-        Command::Public { file, rank } => {
-            key::read(&file).map(|key| println!("{}", key::variable(&key, rank.into())))
-        }
+        Command::Public { file, rank } => key::read(&file).map(|key| println!("{}", public_line(&key, rank))),
         Command::Image(args) => make_image(&args),
         Command::Show { file, key } => show_file(&file, key.as_deref()),
     };

@@ -57,7 +57,7 @@ impl Content {
             );
         }
         let is_mixed = !content.is_for_development() && content.trusts(&DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
-        ensure!(!is_mixed, "the bootloader is one for development: it trusts a key that everybody knows");
+        ensure!(!is_mixed, "the bootloader is one for development: it trusts a published key");
         Ok(content)
     }
 
@@ -113,7 +113,11 @@ impl fmt::Display for Content {
         let about = self.image.header.description();
         writeln!(f, "{:<12}{}, security counter {}", "version", about.version, about.counter)?;
         let digits = key::public_digits(&self.key);
-        let whose = if self.is_for_development() { " (the development key, known to everybody)" } else { "" };
+        let whose = if self.is_for_development() {
+            " (the development key, published in the repository)"
+        } else {
+            ""
+        };
         write!(f, "{:<12}{digits}{whose}", "public key")
     }
 }

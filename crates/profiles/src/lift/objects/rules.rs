@@ -56,7 +56,7 @@ impl Fields {
         match rule {
             Rule::Operating => self.operate(unit, value, image),
             Rule::Preset => self.preset(unit, value, image),
-            Rule::Measure => self.measure_anew(entry.field(), bytes, image),
+            Rule::Measure => self.change_unit(entry.field(), bytes, image),
             Rule::Source => self.take_source(unit, entry.field(), bytes, image),
             Rule::Devices => {
                 self.choose(Devices(value.to_le_bytes()[0]), true, image);
@@ -109,7 +109,7 @@ impl Fields {
 
     /// Tries another measuring step, travel or sensor; one that a sensor cannot give is refused. In other units the
     /// offsets have lost their meaning and become 0, as in CiA 406.
-    fn measure_anew(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    fn change_unit(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let before = Value::of(field, image);
         field.set(image, bytes);
         let is_possible = self.sensors.has_format(image) && self.position_parameters(image).is_consistent();

@@ -6,10 +6,12 @@ use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant};
 use serde::Serialize;
 
+use super::SILENCE;
 use crate::cli::read::place;
 use crate::cli::record::seconds_between;
 use crate::cli::{Failure, Session};
 use crate::lift::{Lift, Reading};
+use crate::text::note;
 use crate::value::Value;
 
 /// The time-out of one wait for a frame; then the next wait begins.
@@ -32,9 +34,15 @@ struct Line {
 /// Prints `count` values.
 pub(super) fn print_lines(session: &mut Session, count: usize) -> Result<(), Failure> {
     let (lift, mut start, mut left) = (Lift::default(), None, count);
+    let (begin, mut hinted) = (session.network.now(), false);
     while left > 0 {
         let until = session.network.now() + PATIENCE;
-        let Some(received) = session.network.receive(until)? else { continue };
+        let received = session.network.receive(until)?;
+        let is_silent = start.is_none() && session.network.now() >= begin + SILENCE;
+        if is_silent && !std::mem::replace(&mut hinted, true) {
+            note("waiting for the pre-defined PDOs of a lift (CiA 417)");
+        }
+        let Some(received) = received else { continue };
         for reading in lift.readings(&received.frame).into_iter().take(left) {
             let start = *start.get_or_insert(received.at);
             session.print(&line(received.frame.id(), reading, start, received.at))?;

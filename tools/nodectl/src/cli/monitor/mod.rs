@@ -82,13 +82,18 @@ impl Monitor {
         let node = session.options.node.one()?.get();
         let (mut acquisition, output) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
-        let (mut start, mut left, mut hinted) = (None, self.count.unwrap_or(usize::MAX), false);
+        let (mut start, mut left) = (None, self.count.unwrap_or(usize::MAX));
+        let mut hinted: Vec<String> = Vec::new();
         let mut told: Vec<Option<Value>> = vec![None; signals.len()];
         while left > 0 {
             let until = acquisition.now() + SILENCE;
             let Some(sample) = acquisition.next(until)? else {
-                let hint = acquisition.hint().filter(|_| !std::mem::replace(&mut hinted, true));
-                hint.iter().for_each(note);
+                if let Some(hint) = acquisition.hint().or_else(|| acquisition.awaited())
+                    && !hinted.contains(&hint)
+                {
+                    note(&hint);
+                    hinted.push(hint);
+                }
                 continue;
             };
             let start = *start.get_or_insert(sample.at);

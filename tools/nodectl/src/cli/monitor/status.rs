@@ -30,7 +30,7 @@ impl Status {
             state: acquisition.state().map_or("no heartbeat yet", words),
             emergency: acquisition.emergency().map(visible),
             rate,
-            hint: acquisition.hint(),
+            hint: acquisition.hint().or_else(|| acquisition.awaited()),
         }
     }
 

@@ -146,7 +146,7 @@ pub(super) fn values(
     Ok(present)
 }
 
-/// What the node is: 1000h, 1018h, 1009h, 100Ah, and whether the data sheet is for it.
+/// The identity of the node: 1000h, 1018h, 1009h, 100Ah, and whether the data sheet is for it.
 pub(super) fn of_identity(session: &mut Session, planned: &PlannedNode) -> Result<Vec<Finding>, Failure> {
     let (node, wanted) = (planned.node, &planned.member.identity);
     let info = planned.catalogue.as_ref().map(|catalogue| &catalogue.sheet().device);

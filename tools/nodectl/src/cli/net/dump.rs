@@ -1,4 +1,4 @@
-//! `nodectl net dump`: the file of a bus as it is.
+//! `nodectl net dump`: the file of the present bus.
 
 use std::fmt::{self, Write as _};
 use std::path::Path;

@@ -11,13 +11,13 @@ use super::{Failure, Session};
 pub(super) struct Finding {
     /// The node; `None` for the bus.
     pub(super) node: Option<u8>,
-    /// What is not as the file says.
+    /// The item that differs from the file.
     pub(super) what: What,
     /// In words, with both values.
     pub(super) text: String,
 }
 
-/// What is not as the file says.
+/// The item that differs from the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum What {

@@ -36,7 +36,7 @@ enum Command {
     Check(Checked),
     /// Configures and starts the nodes of the file. A node with another identity is left alone.
     Apply(Applied),
-    /// Writes the file of the bus as it is, and a configuration file (DCF) for each node with a data sheet.
+    /// Writes the file of the present bus, and a configuration file (DCF) for each node with a data sheet.
     Dump(Dumped),
     /// Prints the schema of the file (JSON Schema), for editors.
     Schema,
@@ -57,7 +57,7 @@ struct Applied {
     #[arg(long)]
     all: bool,
 
-    /// Then watch the bus: a node that comes back is configured and started again.
+    /// Then watch the bus: a node that returns is configured and started again.
     #[arg(long)]
     watch: bool,
 

@@ -17,14 +17,14 @@ use crate::nmt::send;
 /// The longest wait for a frame.
 const WAKE: Duration = Duration::from_millis(100);
 
-/// What has happened to a node.
+/// An event of a node.
 #[derive(Serialize)]
 struct Event {
     node: u8,
     event: &'static str,
 }
 
-/// What is known of a node.
+/// The state of a node.
 #[derive(Clone, Copy, Default)]
 struct Watched {
     newest: Option<Instant>,
