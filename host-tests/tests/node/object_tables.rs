@@ -38,13 +38,14 @@ fn without_tpdos(personality: Personality) -> Bench {
 
 #[test]
 fn the_node_has_nothing_that_the_tables_do_not_know() {
+    let mut differences = Vec::new();
     for personality in Personality::ALL {
         let known = table(personality).into_iter().map(|row| (row.index, row.sub, row.name));
         let own = personality.rows().iter().map(|row| (row.index, row.sub, row.name));
         let [known, own] = [known.collect::<BTreeSet<_>>(), own.collect()];
-        let difference: Vec<_> = known.symmetric_difference(&own).collect();
-        assert!(difference.is_empty(), "{personality:?}: {difference:X?}");
+        differences.extend(known.symmetric_difference(&own).map(|row| (personality, *row)));
     }
+    assert!(differences.is_empty(), "{differences:X?}");
 }
 
 #[test]
