@@ -4,12 +4,16 @@ Virtual time runs as fast as the host can unless a test asks for the speed of a 
 clock of the host: what is asserted are the virtual time stamps that come with every frame.
 """
 
+import contextlib
 import json
 import os
 import queue
 import re
+import socket
 import subprocess
 import tempfile
+import threading
+import tty
 from pathlib import Path
 
 import can
@@ -121,6 +125,21 @@ class Simulator:
         """A python-can bus over slcan."""
         channel = f"socket://127.0.0.1:{self.slcan}"
         return can.Bus(interface="slcan", channel=channel, sleep_after_open=0, **options)
+
+    def serial_adapter(self) -> str:
+        """The serial port of an slcan adapter, as a USB adapter has one: a pseudo-terminal before the slcan server."""
+        adapter, port = os.openpty()
+        tty.setraw(port)
+        server = socket.create_connection(("127.0.0.1", self.slcan))
+
+        def pass_on(read, write) -> None:
+            with contextlib.suppress(OSError):
+                while data := read(4096):
+                    write(data)
+
+        for ends in [(lambda size: os.read(adapter, size), server.sendall), (server.recv, lambda data: os.write(adapter, data))]:
+            threading.Thread(target=pass_on, args=ends, daemon=True).start()
+        return os.ttyname(port)
 
 
 def devices(flags: tuple) -> dict[int, str]:

@@ -30,12 +30,18 @@ def test_a_signal_ends_it_and_what_was_saved_is_kept(tmp_path, number):
 
 
 BUSES = ["socketcand", "slcan"]
+ADAPTERS = [*BUSES, "serial port"]
 
 
 def address(simulator: Simulator, bus: str) -> str:
     """The address of a bus for nodectl."""
-    socketcand, slcan = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0", f"slcan://127.0.0.1:{simulator.slcan}"
-    return {"socketcand": socketcand, "slcan": slcan}[bus]
+    match bus:
+        case "socketcand":
+            return f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+        case "slcan":
+            return f"slcan://127.0.0.1:{simulator.slcan}"
+        case _:
+            return f"slcan:{simulator.serial_adapter()}"
 
 
 def nodectl(simulator: Simulator, bus: str, *arguments: str) -> str:
@@ -65,7 +71,7 @@ def test_frames_that_python_can_sends_before_it_leaves_are_on_the_bus(tmp_path, 
 
 
 @pytest.mark.parametrize("bitrate", [10, 250, 1000])
-@pytest.mark.parametrize("bus", BUSES)
+@pytest.mark.parametrize("bus", ADAPTERS)
 def test_the_last_frame_of_nodectl_is_on_the_bus(tmp_path, bus, bitrate):
     log = tmp_path / "bus.log"
     simulator = Simulator("--candump", str(log), "--bitrate", str(bitrate), speed="real")
@@ -76,7 +82,7 @@ def test_the_last_frame_of_nodectl_is_on_the_bus(tmp_path, bus, bitrate):
     assert log.read_text().count(" 000#8009") == 6
 
 
-@pytest.mark.parametrize("bus", BUSES)
+@pytest.mark.parametrize("bus", ADAPTERS)
 def test_a_node_is_out_of_lss_configuration_after_nodectl_has_set_its_node_id(bus):
     simulator = Simulator(speed="real")
     Master(simulator).close()
@@ -89,4 +95,13 @@ def test_a_node_is_out_of_lss_configuration_after_nodectl_has_set_its_node_id(bu
             frame = client.recv(PATIENCE)
             assert frame.arbitration_id != 0x7E4, "the node is in the state Configuration"
             heartbeats += frame.arbitration_id == 0x701
+    simulator.quit()
+
+
+def test_every_adapter_reads_the_same_values():
+    simulator = Simulator(speed="real")
+    Master(simulator).close()
+    values = {bus: nodectl(simulator, bus, "-n", "1", "read", "1018", "1008", "1017") for bus in ADAPTERS}
+    assert "STM32F4 pressure transmitter" in values["serial port"]
+    assert len(set(values.values())) == 1, values
     simulator.quit()
