@@ -56,3 +56,26 @@ pub fn to_driver<F: Driver>(frame: &Frame) -> Option<F> {
     let id = StandardId::new(frame.id())?;
     if frame.is_remote() { F::new_remote(id, frame.len()) } else { F::new(id, frame.data()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use embedded_can::ExtendedId;
+
+    use super::*;
+
+    #[test]
+    fn a_frame_crosses_a_driver_unchanged() {
+        let data = Frame::new(0x181, &[1, 2, 3]);
+        for frame in [data, Frame::new(0x7FF, &[]), Frame::remote(0x701, 8)].map(Option::unwrap) {
+            assert_eq!(from_driver(&to_driver::<Frame>(&frame).unwrap()), Some(frame));
+            assert_eq!((Driver::dlc(&frame), frame.is_extended()), (frame.len(), false));
+        }
+    }
+
+    #[test]
+    fn extended_identifiers_are_not_taken() {
+        let id = ExtendedId::new(0x181).unwrap();
+        assert_eq!(<Frame as Driver>::new(id, &[1]), None);
+        assert_eq!(<Frame as Driver>::new_remote(id, 1), None);
+    }
+}

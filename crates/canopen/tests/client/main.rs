@@ -3,5 +3,6 @@
 mod abort_codes;
 mod hostile;
 mod lss;
+mod nmt;
 mod server;
 mod transfers;

@@ -15,6 +15,7 @@ mod exchange;
 mod guarding;
 mod heartbeat;
 mod hooks;
+mod indicators;
 mod long_time;
 mod lss;
 mod mapping;
