@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
-use chip::plant::{FaultKind, Signal};
+use chip::plant::Signal;
 use chip::{FLASH_BASE, Stm32f4};
 use emulator::{Incident, Machine, Model, Stop};
 use update::HEADER_LEN;
@@ -16,7 +16,7 @@ use crate::image::Image;
 use crate::log::{Line, Log, Ram};
 use crate::personality::Personality;
 use crate::status::NodeStatus;
-use crate::stimuli::{BoardStimuli, Knob, Stimulus};
+use crate::stimuli::{BoardStimuli, Inputs, Stimulus};
 use crate::summary::NodeSummary;
 use crate::traffic::Heard;
 
@@ -217,20 +217,12 @@ impl Board {
 
     /// The current stimuli of the sensors.
     pub(crate) fn stimuli(&self, node_id: u8) -> BoardStimuli {
-        let (now, plant) = (self.machine.now(), self.machine.peripherals().plant());
-        let knob = |spec: &dyn ToString, value| Knob { spec: spec.to_string(), value };
+        let (chip, now) = (self.machine.peripherals(), self.machine.now());
         BoardStimuli {
             board: self.id,
             node: node_id,
             personality: self.personality,
-            pressure: knob(plant.pressure_signal(), plant.pressure(now)),
-            temperature: knob(plant.temperature_signal(), plant.temperature(now)),
-            thermistor: knob(plant.thermistor_signal(), plant.thermistor(now)),
-            supply: knob(plant.supply_signal(), plant.supply(now)),
-            shaft: knob(plant.motion(), plant.revolutions(now)),
-            ssi: self.machine.peripherals().ssi().to_string(),
-            buttons: plant.held(),
-            faults: plant.faults(now).map(FaultKind::name).collect(),
+            inputs: Inputs::of(chip, now),
         }
     }
 

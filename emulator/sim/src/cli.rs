@@ -13,7 +13,7 @@ use storage::DeviceRecord;
 
 use crate::oscillator::{Lsi, Oscillator};
 use crate::personality::Personality;
-use crate::stimuli::{Stimulus, Targeted};
+use crate::stimuli::{Flags, Targeted};
 
 /// Runs the firmware on emulated boards that share a CAN bus with your programs.
 #[derive(Debug, Parser)]
@@ -93,38 +93,9 @@ pub struct Options {
     #[arg(long, value_enum, default_value = "info")]
     pub log: LogLevel,
 
-    /// Pressure at the sensor in Pa, e.g. const:250000 or sine:250000,100000,2.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("pressure", text))]
-    pub pressure: Vec<Targeted<Stimulus>>,
-
-    /// Temperature of the chip in K, e.g. const:298.15.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("temperature", text))]
-    pub temperature: Vec<Targeted<Stimulus>>,
-
-    /// Temperature of the thermistor in K, e.g. const:298.15.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("thermistor", text))]
-    pub thermistor: Vec<Targeted<Stimulus>>,
-
-    /// Supply of the chip in V, e.g. ramp:3.3,1.7,2.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("supply", text))]
-    pub supply: Vec<Targeted<Stimulus>>,
-
-    /// The encoder's shaft in revolutions, or its speed, e.g. const:0.25 or rpm:6000.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
-    pub shaft: Vec<Targeted<Stimulus>>,
-
-    /// Format of the absolute encoder, e.g. 12+13,gray,error,even: bits of the turns and the steps, coding, error bit,
-    /// parity.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("ssi", text))]
-    pub ssi: Vec<Targeted<Stimulus>>,
-
-    /// Press or release a button, e.g. 1:down.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("button", text))]
-    pub button: Vec<Targeted<Stimulus>>,
-
-    /// A fault from a time on, e.g. open-sensor@2.5.
-    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("fault", text))]
-    pub fault: Vec<Targeted<Stimulus>>,
+    /// The stimuli from the start on.
+    #[command(flatten)]
+    pub stimuli: Flags,
 
     /// Error of the board's oscillator in ppm; the bit time of the CAN controller follows to within 100 ppm at 1
     /// Mbit/s.
@@ -290,7 +261,7 @@ mod tests {
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));
-        assert_eq!((options.shaft[0].node, options.pressure[0].node), (Some(2), None));
+        assert_eq!((options.stimuli.shaft[0].node, options.stimuli.pressure[0].node), (Some(2), None));
     }
 
     #[test]

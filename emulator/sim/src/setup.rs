@@ -48,10 +48,7 @@ pub fn world(options: &Options) -> Result<World> {
     }
     ensure!(all_are_for_a_node(&options.oscillator, options), "an oscillator is for nobody");
     ensure!(all_are_for_a_node(&options.lsi, options), "an LSI is for nobody");
-    let Options { pressure, temperature, thermistor, supply, shaft, ssi, button, fault, .. } = options;
-    let stimuli =
-        [pressure, temperature, thermistor, supply, shaft, ssi, button, fault].into_iter().flatten();
-    for stimulus in stimuli {
+    for stimulus in options.stimuli.all() {
         world.apply(stimulus).context("a stimulus")?;
     }
     Ok(world)

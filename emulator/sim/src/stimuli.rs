@@ -4,8 +4,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use canbus::Time;
-use chip::plant::{Fault, FaultSwitch, Motion, Push, Signal};
+use chip::plant::{Fault, FaultKind, FaultSwitch, Motion, Push, Signal};
 use chip::{BUTTONS, SsiFormat, Stm32f4};
+use clap::Args;
 use serde::Serialize;
 
 use crate::cli::{BOARD_NUMBERS, board_number};
@@ -76,6 +77,51 @@ impl Stimulus {
     }
 }
 
+/// The flags of the command line that set stimuli from the start on.
+#[derive(Debug, Args)]
+pub struct Flags {
+    /// Pressure at the sensor in Pa, e.g. const:250000 or sine:250000,100000,2.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("pressure", text))]
+    pub pressure: Vec<Targeted<Stimulus>>,
+
+    /// Temperature of the chip in K, e.g. const:298.15.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("temperature", text))]
+    pub temperature: Vec<Targeted<Stimulus>>,
+
+    /// Temperature of the thermistor in K, e.g. const:298.15.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("thermistor", text))]
+    pub thermistor: Vec<Targeted<Stimulus>>,
+
+    /// Supply of the chip in V, e.g. ramp:3.3,1.7,2.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("supply", text))]
+    pub supply: Vec<Targeted<Stimulus>>,
+
+    /// The encoder's shaft in revolutions, or its speed, e.g. const:0.25 or rpm:6000.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
+    pub shaft: Vec<Targeted<Stimulus>>,
+
+    /// Format of the absolute encoder, e.g. 12+13,gray,error,even: bits of the turns and the steps, coding, error bit,
+    /// parity.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("ssi", text))]
+    pub ssi: Vec<Targeted<Stimulus>>,
+
+    /// Press or release a button, e.g. 1:down.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("button", text))]
+    pub button: Vec<Targeted<Stimulus>>,
+
+    /// A fault from a time on, e.g. open-sensor@2.5.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("fault", text))]
+    pub fault: Vec<Targeted<Stimulus>>,
+}
+
+impl Flags {
+    /// The stimuli in the order of the flags.
+    pub(crate) fn all(&self) -> impl Iterator<Item = &Targeted<Stimulus>> {
+        let Flags { pressure, temperature, thermistor, supply, shaft, ssi, button, fault } = self;
+        [pressure, temperature, thermistor, supply, shaft, ssi, button, fault].into_iter().flatten()
+    }
+}
+
 /// The stimuli of one board at an instant.
 #[derive(Clone, Debug, Serialize)]
 pub struct BoardStimuli {
@@ -85,6 +131,14 @@ pub struct BoardStimuli {
     pub node: u8,
     /// The personality.
     pub personality: Personality,
+    /// What acts on the inputs.
+    #[serde(flatten)]
+    pub inputs: Inputs,
+}
+
+/// What acts on the inputs of a board.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inputs {
     /// The pressure, in Pa.
     pub pressure: Knob,
     /// The temperature of the chip, in K.
@@ -101,6 +155,24 @@ pub struct BoardStimuli {
     pub buttons: [bool; BUTTONS],
     /// The names of the active faults.
     pub faults: Vec<&'static str>,
+}
+
+impl Inputs {
+    /// The present inputs of a chip.
+    pub(crate) fn of(chip: &Stm32f4, now: Time) -> Inputs {
+        let plant = chip.plant();
+        let knob = |spec: &dyn ToString, value| Knob { spec: spec.to_string(), value };
+        Inputs {
+            pressure: knob(plant.pressure_signal(), plant.pressure(now)),
+            temperature: knob(plant.temperature_signal(), plant.temperature(now)),
+            thermistor: knob(plant.thermistor_signal(), plant.thermistor(now)),
+            supply: knob(plant.supply_signal(), plant.supply(now)),
+            shaft: knob(plant.motion(), plant.revolutions(now)),
+            ssi: chip.ssi().to_string(),
+            buttons: plant.held(),
+            faults: plant.faults(now).map(FaultKind::name).collect(),
+        }
+    }
 }
 
 /// The kinds of stimuli.
