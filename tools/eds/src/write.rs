@@ -2,9 +2,11 @@
 //! [`canopen::eds`]. The text is the same on every run.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use canopen::dictionary::{DefaultValue, Object as Row};
 use canopen::eds::{self, BIT_RATES, DeviceKeys, EntryKeys, Writer};
+use profiles::Personality;
 use profiles::product::{REVISION, VENDOR_ID};
 
 use crate::{Device, DeviceInfo, Edition, Eds, Entry, Flags, Object, Reals};
@@ -38,9 +40,16 @@ impl Device {
         text
     }
 
-    /// The data sheet as a value, with the units, which the text has in comments.
+    /// The data sheet as a value, with the units, which the text has in comments. The text is read once.
     #[must_use]
     pub fn eds(&self) -> Eds {
+        static READ: [OnceLock<Eds>; Personality::ALL.len()] =
+            [const { OnceLock::new() }; Personality::ALL.len()];
+        let read = READ.get(usize::from(self.personality.number()));
+        read.map_or_else(|| self.read(), |read| read.get_or_init(|| self.read()).clone())
+    }
+
+    fn read(&self) -> Eds {
         let mut eds = Eds::parse(&self.sheet(&Edition::default())).unwrap_or_default();
         for row in self.rows {
             let object = eds.objects.get_mut(&row.index);
