@@ -183,8 +183,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "states::an_error_that_is_found_at_a_start_acts_as_1029h_demands",
         edits: &[Edit {
             file: "crates/canopen/src/emcy/fault.rs",
-            mended: "Fault::StoredData(_) | Fault::OlderData(_) => (0, Some(ErrorClass::DEVICE)),",
-            fault: "Fault::StoredData(_) | Fault::OlderData(_) => (0, None),",
+            mended: "Fault::StoredData(_) | Fault::OlderData(_) => Some(ErrorClass::DEVICE),",
+            fault: "Fault::StoredData(_) | Fault::OlderData(_) => None,",
         }],
     },
     Mend {

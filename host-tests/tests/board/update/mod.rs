@@ -17,8 +17,6 @@ use bsp::update_layout::LAYOUT;
 use callgraph::budget::{Budget, Compiler};
 use canbus::Time;
 use host_tests::thorough::either;
-use host_tests::watch::expects;
-use monitor::Rule;
 use update::{HEADER_LEN, Status};
 
 use crate::stack::assert_bound;
@@ -167,7 +165,6 @@ fn an_application_that_is_not_on_the_bus_does_not_confirm_itself() {
 /// that area resets the counter.
 #[test]
 fn the_security_counter_outlives_the_application() {
-    let _expected = expects([Rule::SdoProtocol]);
     const COUNTER: u8 = 66;
     let code = version_b(0).code;
     let [older, newer] = [1, 2].map(|counter| signed(code.clone(), |about| about.counter = counter));
