@@ -131,12 +131,12 @@ pub struct BoardStimuli {
     pub node: u8,
     /// The personality.
     pub personality: Personality,
-    /// What acts on the inputs.
+    /// The inputs of the board.
     #[serde(flatten)]
     pub inputs: Inputs,
 }
 
-/// What acts on the inputs of a board.
+/// The inputs of a board: the setting and the present value of each.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inputs {
     /// The pressure, in Pa.

@@ -12,6 +12,9 @@ use crate::{Findings, Key, Rule};
 const KEPT: usize = 1 << 20;
 /// The time for an answer in us.
 const TIME_OUT: u64 = 1_000_000;
+/// The longest time in us between two segments of a block that are on their way. A server gives a client that pauses
+/// longer.
+const IN_A_ROW: u64 = 100_000;
 
 /// The server's next frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,6 +129,9 @@ impl Channel {
         };
         if self.expect == Expect::Nothing && now.0 > self.since.0.saturating_add(TIME_OUT) {
             self.crossing = 0;
+        }
+        if now.0 > self.since.0.saturating_add(IN_A_ROW) {
+            self.stray = None;
         }
         self.since = now;
         if self.is_stray(data[0]) {

@@ -55,6 +55,14 @@ fn a_clean_trace_passes() {
     assert!(known.frames() > 120, "{}", known.frames());
 }
 
+/// A server aborts a refused block after the pause of its client. The next request has the number of the next segment.
+#[test]
+fn a_request_after_a_pause_is_no_segment() {
+    let mut trace = Trace::clean();
+    trace.at(1_510_000).refused_block_with_a_pause();
+    assert_eq!(text(&judged(&trace)), "");
+}
+
 #[test]
 fn every_seeded_breach_is_noticed_by_name() {
     let all = breaches::all();

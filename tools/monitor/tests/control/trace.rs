@@ -155,6 +155,17 @@ impl Trace {
         self.ask(&[0x41, 1, 0x10, 0, 0, 0, 0, 0], &[]);
     }
 
+    /// A block download of 63 segments that node 5 aborts after a pause of 300 ms, and an upload of 6003h.
+    pub(crate) fn refused_block_with_a_pause(&mut self) {
+        self.ask(&[0xC4, 0x00, 0x2F, 0, 0, 0, 0, 0], &[0xA4, 0x00, 0x2F, 0, 127, 0, 0, 0]);
+        for sequence in 0x01..=0x3F {
+            self.ask(&[sequence, 1, 2, 3, 4, 5, 6, 7], &[]);
+        }
+        self.now += 300_000;
+        self.answer(&[0x80, 0x00, 0x2F, 0, 0, 0, 6, 6]);
+        self.read(0x6003, 0, &0_u32.to_le_bytes());
+    }
+
     /// SYNC every 20 ms, and two events of TPDO 2.
     fn operational(&mut self) {
         self.client(310_000, 0x000, &[1, 0]);
