@@ -55,7 +55,7 @@ fn devices() -> String {
             file = device.file_name,
         );
     }
-    let rates = DEVICES[0].eds().device.bit_rates;
+    let rates = &DEVICES[0].eds().device.bit_rates;
     let rates: Vec<String> = rates.iter().map(ToString::to_string).collect();
     text + &format!("\nBit rates in kbit/s: {}.\n", rates.join(", "))
 }
@@ -73,7 +73,7 @@ fn pdos() -> String {
         );
         for (communication, mapping, word) in DIRECTIONS {
             let used = eds.objects.range(communication..communication + 0x200).map(|(index, _)| *index);
-            text.extend(used.filter_map(|index| pdo(&eds, index, mapping + (index - communication), word)));
+            text.extend(used.filter_map(|index| pdo(eds, index, mapping + (index - communication), word)));
         }
     }
     text
@@ -122,9 +122,9 @@ fn number(eds: &Eds, index: u16, sub: u8) -> Option<i128> {
 fn objects() -> String {
     let mut rows: BTreeMap<(u16, String), [bool; DEVICES.len()]> = BTreeMap::new();
     for (column, device) in DEVICES.iter().enumerate() {
-        let objects = device.eds().objects.into_values();
+        let objects = device.eds().objects.values();
         for object in objects.filter(|object| !(0x1400..0x1C00).contains(&object.index)) {
-            rows.entry((object.index, object.name)).or_default()[column] = true;
+            rows.entry((object.index, object.name.clone())).or_default()[column] = true;
         }
     }
     let heads = DEVICES.each_ref().map(|device: &Device| device.file_name.trim_end_matches(".eds"));

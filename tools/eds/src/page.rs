@@ -51,7 +51,7 @@ fn section(device: &Device) -> String {
     );
     for (name, range) in RANGES {
         let objects = device.objects().filter(|rows| range.contains(&rows[0].index));
-        let lines: Vec<Cells> = objects.flat_map(|rows| object(&eds, rows)).collect();
+        let lines: Vec<Cells> = objects.flat_map(|rows| object(eds, rows)).collect();
         if !lines.is_empty() {
             text += &format!("\n### {name}, {:04X}h to {:04X}h\n\n", range.start(), range.end());
             text += &table(&lines);

@@ -42,11 +42,10 @@ impl Device {
 
     /// The data sheet as a value, with the units, which the text has in comments. The text is read once.
     #[must_use]
-    pub fn eds(&self) -> Eds {
+    pub fn eds(&self) -> &'static Eds {
         static READ: [OnceLock<Eds>; Personality::ALL.len()] =
             [const { OnceLock::new() }; Personality::ALL.len()];
-        let read = READ.get(usize::from(self.personality.number()));
-        read.map_or_else(|| self.read(), |read| read.get_or_init(|| self.read()).clone())
+        READ[usize::from(self.personality.number())].get_or_init(|| self.read())
     }
 
     fn read(&self) -> Eds {

@@ -20,7 +20,7 @@ fn the_generated_files_are_up_to_date() {
 fn the_page_has_every_object_once_for_each_device_that_has_it() {
     let files = files();
     let page = files.iter().find(|file| file.path.ends_with("object-dictionary.md")).unwrap();
-    let indices: Vec<u16> = DEVICES.iter().flat_map(|device| device.eds().objects.into_keys()).collect();
+    let indices: Vec<u16> = DEVICES.iter().flat_map(|device| device.eds().objects.keys().copied()).collect();
     for index in &indices {
         let times = indices.iter().filter(|other| *other == index).count();
         assert_eq!(page.text.matches(&format!("| {index:04X}h | 0 ")).count(), times, "{index:04X}h");

@@ -11,23 +11,23 @@ fn found(eds: &Eds, query: &str) -> (u16, u8) {
 fn addresses_are_found_in_every_spelling() {
     let eds = DEVICES[0].eds();
     for query in ["1018:1", "0x1018:1", "1018h:1", "1018sub1", "0x1018sub1", "0X1018:0x1", " 1018:01 "] {
-        assert_eq!(found(&eds, query), (0x1018, 1), "{query}");
+        assert_eq!(found(eds, query), (0x1018, 1), "{query}");
     }
     for query in ["1018", "0x1018", "1018h"] {
-        assert_eq!(found(&eds, query), (0x1018, 0), "{query}");
+        assert_eq!(found(eds, query), (0x1018, 0), "{query}");
     }
-    assert_eq!(found(&eds, "1003:10"), (0x1003, 10));
-    assert_eq!(found(&eds, "1003subA"), (0x1003, 10));
+    assert_eq!(found(eds, "1003:10"), (0x1003, 10));
+    assert_eq!(found(eds, "1003subA"), (0x1003, 10));
 }
 
 #[test]
 fn names_are_found_in_any_case() {
     let eds = DEVICES[0].eds();
-    assert_eq!(found(&eds, "error REGISTER"), (0x1001, 0));
-    assert_eq!(found(&eds, "Identity/Vendor-ID"), (0x1018, 1));
-    assert_eq!(found(&eds, "vendor-id"), (0x1018, 1));
-    assert_eq!(found(&eds, "identity"), (0x1018, 0));
-    assert_eq!(found(&eds, "Non-volatile user storage/User word 16"), (0x4000, 16));
+    assert_eq!(found(eds, "error REGISTER"), (0x1001, 0));
+    assert_eq!(found(eds, "Identity/Vendor-ID"), (0x1018, 1));
+    assert_eq!(found(eds, "vendor-id"), (0x1018, 1));
+    assert_eq!(found(eds, "identity"), (0x1018, 0));
+    assert_eq!(found(eds, "Non-volatile user storage/User word 16"), (0x4000, 16));
 }
 
 #[test]
@@ -35,7 +35,7 @@ fn the_path_of_every_entry_finds_it() {
     for device in &DEVICES {
         let eds = device.eds();
         for entry in eds.entries() {
-            assert_eq!(found(&eds, &eds.path(entry)), (entry.index, entry.sub));
+            assert_eq!(found(eds, &eds.path(entry)), (entry.index, entry.sub));
         }
     }
 }
@@ -77,9 +77,9 @@ fn a_name_of_several_entries_is_ambiguous() {
 #[test]
 fn words_are_found_in_any_order() {
     let eds = DEVICES[0].eds();
-    assert_eq!(found(&eds, "heartbeat producer"), (0x1017, 0));
-    assert_eq!(found(&eds, "time heartbeat producer"), (0x1017, 0));
-    assert_eq!(found(&eds, "event timer TPDO 2"), (0x1801, 5));
+    assert_eq!(found(eds, "heartbeat producer"), (0x1017, 0));
+    assert_eq!(found(eds, "time heartbeat producer"), (0x1017, 0));
+    assert_eq!(found(eds, "event timer TPDO 2"), (0x1801, 5));
     assert!(
         matches!(eds.find("event timer"), Err(LookupError::Ambiguous { candidates, .. }) if candidates.len() == 16)
     );

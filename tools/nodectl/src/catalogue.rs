@@ -2,7 +2,7 @@
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
-use eds::{DEVICES, DataType, DeviceInfo, Eds, Entry, LookupError};
+use eds::{DEVICES, DataType, Device, DeviceInfo, Eds, Entry, LookupError};
 
 use crate::unit;
 use crate::value::Value;
@@ -26,7 +26,7 @@ impl Catalogue {
     #[must_use]
     pub fn new(mut sheet: Eds) -> Catalogue {
         let DeviceInfo { vendor_number, product_number, .. } = sheet.device;
-        if let Some(own) = built_in(vendor_number, product_number) {
+        if let Some(own) = built_in(vendor_number, product_number).map(Device::eds) {
             let entries = sheet.objects.values_mut().flat_map(|object| object.entries.values_mut());
             for entry in entries.filter(|entry| entry.unit.is_empty()) {
                 entry.unit = own.get(entry.index, entry.sub).map_or_else(String::new, |own| own.unit.clone());
@@ -44,13 +44,16 @@ impl Catalogue {
     /// The data sheet of a device of this project with this identity (1018h:1 and 2).
     #[must_use]
     pub fn built_in(vendor: u32, product: u32) -> Option<Catalogue> {
-        built_in(vendor, product).map(Catalogue::new)
+        built_in(vendor, product).map(|device| Catalogue::new(device.eds().clone()))
     }
 
     /// The data sheet of a device of this project, by its file name.
     #[must_use]
     pub fn of_file(name: &str) -> Option<Catalogue> {
-        DEVICES.iter().find(|device| device.file_name == name).map(|device| Catalogue::new(device.eds()))
+        DEVICES
+            .iter()
+            .find(|device| device.file_name == name)
+            .map(|device| Catalogue::new(device.eds().clone()))
     }
 
     /// The object that a person means, by address or by name. Any address is accepted, also one that no data sheet has.
@@ -154,11 +157,7 @@ impl Catalogue {
     /// The name of a device of this project, by its identity (1018h:1 and 2): `pressure`, `encoder` ...
     #[must_use]
     pub fn device_name(vendor: u32, product: u32) -> Option<String> {
-        let is_it = |device: &&eds::Device| {
-            let info = device.eds().device;
-            (info.vendor_number, info.product_number) == (vendor, product)
-        };
-        DEVICES.iter().find(is_it).map(|device| device.file_name.trim_end_matches(".eds").to_owned())
+        built_in(vendor, product).map(|device| device.file_name.trim_end_matches(".eds").to_owned())
     }
 
     /// All readable entries of a record or an array; none where the object is unknown.
@@ -186,13 +185,13 @@ impl Catalogue {
     }
 }
 
-fn built_in(vendor: u32, product: u32) -> Option<Eds> {
-    let is_it = |sheet: &Eds| (sheet.device.vendor_number, sheet.device.product_number) == (vendor, product);
-    DEVICES.iter().map(eds::Device::eds).find(is_it)
+fn built_in(vendor: u32, product: u32) -> Option<&'static Device> {
+    let is_it = |info: &DeviceInfo| (info.vendor_number, info.product_number) == (vendor, product);
+    DEVICES.iter().find(|device| is_it(&device.eds().device))
 }
 
 fn common() -> Eds {
-    let mut eds = DEVICES.first().map(eds::Device::eds).unwrap_or_default();
+    let mut eds = DEVICES.first().map(|device| device.eds().clone()).unwrap_or_default();
     eds.objects.retain(|&index, _| index < FIRST_OF_VENDOR);
     // The objects are the profile of every device, so the sheet names no device.
     eds.device = DeviceInfo::default();

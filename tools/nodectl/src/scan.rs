@@ -31,14 +31,17 @@ pub fn scan(network: &mut Network, time: Duration) -> Result<BTreeMap<NodeId, Pr
     let mut found = BTreeMap::new();
     for node in (1..=127).filter_map(NodeId::new) {
         network.pass()?;
-        let question = Request::Upload(at(0x1000, 0)).encode();
-        if let Some(frame) = Frame::new(0x600 + u16::from(node.get()), &question) {
-            network.send(&frame)?;
-        }
+        ask(network, node)?;
         listen(network, PACE, &mut found)?;
     }
     listen(network, time, &mut found)?;
     Ok(found)
+}
+
+/// Asks a node for its device type.
+pub(crate) fn ask(network: &mut Network, node: NodeId) -> Result<(), BusError> {
+    let question = Request::Upload(at(0x1000, 0)).encode();
+    Frame::new(0x600 + u16::from(node.get()), &question).map_or(Ok(()), |frame| network.send(&frame))
 }
 
 fn listen(

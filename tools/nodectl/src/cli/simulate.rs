@@ -4,18 +4,17 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::path::PathBuf;
 
-use canopen::sdo::Request;
 use canopen::{Duration, Frame, NodeId, QueueFull, Transmit};
 use clap::Args;
 use serde::Serialize;
 
 use super::{Failure, Session};
-use crate::Catalogue;
 use crate::bus::Station;
 use crate::object::at;
 use crate::simulate::{Node, Script, Table};
 use crate::text::{note, visible};
 use crate::value::unsigned;
+use crate::{Catalogue, scan};
 
 /// The largest script.
 const LARGEST: u64 = 1 << 20;
@@ -136,10 +135,8 @@ fn is_in_use(session: &mut Session, node: NodeId) -> Result<bool, Failure> {
     if network.heard(node).is_some() {
         return Ok(true);
     }
+    scan::ask(network, node)?;
     let id = u16::from(node.get());
-    if let Some(question) = Frame::new(0x600 + id, &Request::Upload(at(0x1000, 0)).encode()) {
-        network.send(&question)?;
-    }
     let until = network.now() + LISTEN;
     let is_of_node = |frame: &Frame| [0x580 + id, 0x700 + id].contains(&frame.id()) && !frame.is_remote();
     Ok(network.wait(until, |frame| is_of_node(frame).then_some(()))?.is_some())

@@ -25,7 +25,7 @@ fn own_personalities_conform() {
             printed(&wire, &["write", "--node", "5", "2305", "15"]);
             printed(&wire, &["save", "--node", "5"]);
         }
-        let run = judge(&wire, Some(device.eds()), Some(profile(device.personality)), &[]);
+        let run = judge(&wire, Some(device.eds().clone()), Some(profile(device.personality)), &[]);
         let lines = complaints(&run).join("\n");
         assert_eq!(
             (run.count("failed"), &run.left_behind[..]),
