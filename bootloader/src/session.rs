@@ -102,8 +102,15 @@ impl Session {
     fn join(&mut self, out: &mut Outbox) {
         // The resulting actions are left to the next poll.
         let _ = self.device.start(Clock::now(), out);
+        self.enter();
+    }
+
+    /// The controller joins the bus. The next start finds the node-ID and the bit rate.
+    #[inline(never)]
+    fn enter(&mut self) {
         self.can.start(self.timing, &self.banks());
-        self.note();
+        let node_id = self.device.node_id().map(NodeId::get);
+        retained::hand_over(&Handover { node_id, timing: self.timing, stay: false });
     }
 
     /// Handles a received frame.
@@ -121,13 +128,14 @@ impl Session {
         let next = self.advance();
         let next_call = self.device.poll(now, out);
         let due = self.fulfil(next_call, out);
-        match (self.reset, next) {
+        let pause = match (next, self.reset) {
             // A reset waits until the work on the flash is done: resets in the middle of copies would wear it out.
-            (_, Next::Step) => Then::Again,
-            (_, Next::Erasing) => Then::Sleep(due.min(after(ERASE_POLL))),
-            (Some(latest), Next::Nothing) => Then::Reset(latest),
-            (None, Next::Nothing) => Then::Sleep(due.min(after(PERIOD)).min(self.back_off.due())),
-        }
+            (Next::Step, _) => return Then::Again,
+            (Next::Erasing, _) => ERASE_POLL,
+            (Next::Nothing, Some(latest)) => return Then::Reset(latest),
+            (Next::Nothing, None) => PERIOD,
+        };
+        Then::Sleep(due.min(after(pause)).min(self.back_off.due()))
     }
 
     /// Does one step of the update. A valid image is copied at once: 1F57h is busy until the image can be started.
@@ -175,9 +183,7 @@ impl Session {
                 Action::Identifiers => self.filter(),
                 Action::BitRate(bit_rate) => {
                     self.timing = BitTiming::of(bit_rate.kbit()).unwrap_or(self.timing);
-                    self.can.start(self.timing, &[]);
-                    self.note();
-                    self.filter();
+                    self.enter();
                 }
                 // The parameters belong to the application.
                 Action::Store(_) => (),
@@ -193,12 +199,6 @@ impl Session {
 
     fn reset_soon(&mut self) {
         self.reset.get_or_insert(after(FAREWELL));
-    }
-
-    /// Notes node-ID and bit rate for the next start.
-    fn note(&self) {
-        let node_id = self.device.node_id().map(NodeId::get);
-        retained::hand_over(&Handover { node_id, timing: self.timing, stay: false });
     }
 
     fn watch_bus(&mut self, now: Instant) {
@@ -218,7 +218,7 @@ impl Session {
     /// of [`ServiceDevice::service_ids`], whose iterator needs 800 bytes of flash.
     fn banks(&self) -> [Bank; 2] {
         let request = self.device.node_id().map_or(LSS_REQUEST, |own| SDO_REQUEST | u16::from(own.get()));
-        [[CanId::NMT.get(), LSS_REQUEST], [request; 2]]
-            .map(|pair| Bank { fifo: Fifo::Services, pairs: pair.map(Pair::exactly) })
+        [[Pair::exactly(CanId::NMT.get()), Pair::exactly(LSS_REQUEST)], [Pair::exactly(request); 2]]
+            .map(|pairs| Bank { fifo: Fifo::Services, pairs })
     }
 }

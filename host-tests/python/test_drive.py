@@ -129,7 +129,9 @@ def test_a_position_beyond_the_limit_is_not_passed(bench):
 
 def test_a_velocity_is_reached_and_halt_stops_it(bench):
     bench.node.sdo[0x6060].raw = 3
-    assert bench.node.sdo[0x6061].raw == 3
+    # The drive takes a mode in its next cycle.
+    while bench.node.sdo[0x6061].raw != 3:
+        pass
     bench.enable()
     data = ENABLE.to_bytes(2, "little") + (-2000).to_bytes(4, "little", signed=True)
     bench.network.send_message(0x500 + NODE, data)

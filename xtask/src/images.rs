@@ -22,12 +22,15 @@ pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development
 /// The default chip of the images.
 pub(crate) const CHIP: &str = "stm32f446";
 
-/// The features of the boards with the other chips (crates/bsp/src/boards).
-const OTHER_BOARDS: [&str; 2] = ["weact-f405rg", "black-f407ve"];
+/// The other chips, and the features of their boards (crates/bsp/src/boards). The second is the first with Ethernet and
+/// a camera, which the images do not use. So the first represents both in quick tests.
+pub(crate) const OTHER_CHIPS: [(&str, &str); 2] =
+    [("stm32f405", "bsp/weact-f405rg"), ("stm32f407", "bsp/black-f407ve")];
 
-/// The other chips. The second is the first with Ethernet and a camera, which the images do not use. So the first
-/// represents both in quick tests.
-pub(crate) const OTHER_CHIPS: [&str; 2] = ["stm32f405", "stm32f407"];
+/// The feature of the board with this other chip.
+pub(crate) fn other_board(chip: &str) -> Option<&'static str> {
+    OTHER_CHIPS.iter().find_map(|(other, board)| (*other == chip).then_some(*board))
+}
 
 /// Compiles the firmware and the bootloader for development. Returns their directory.
 pub(crate) fn compile_node(toolchain: &Toolchain, chip: &str) -> Result<PathBuf> {
@@ -56,9 +59,8 @@ pub(crate) fn check_for(toolchain: &Toolchain, chip: &str) -> Result<()> {
 }
 
 fn call_cargo_for(toolchain: &Toolchain, verb: &str, chip: &str) -> Result<()> {
-    let mut boards = OTHER_CHIPS.iter().zip(OTHER_BOARDS);
-    let board = boards.find_map(|(other, board)| (*other == chip).then_some(board));
-    let features = ["--no-default-features", "--features", board.context("no board has this chip")?];
+    let board = other_board(chip).context("no board has this chip")?;
+    let features = ["--no-default-features", "--features", board];
     let mut command = toolchain.cargo(verb, &["--release", "-p", "firmware", "-p", "bootloader"]);
     progress::build(chip, command.args(features).args(DEVELOPMENT))
 }

@@ -41,7 +41,7 @@ fn chip(flags: &[OsString]) -> &str {
         None => None,
     });
     let named = found.and_then(|name| name.or_else(|| flags.next()));
-    named.filter(|name| images::OTHER_CHIPS.contains(name)).unwrap_or(images::CHIP)
+    named.filter(|name| images::other_board(name).is_some()).unwrap_or(images::CHIP)
 }
 
 /// Replaces this process by the simulator with the user's flags, so that a signal to `cargo sim` reaches the simulator.

@@ -25,3 +25,30 @@ pub fn settle(now: Instant, mut poll: impl FnMut() -> Next) -> Next {
     assert!(next.action.is_none() && next.due() > now, "after a poll at {now:?}, {next:?} is due");
     next
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn due(at: u64) -> Next {
+        Next { action: None, process: Instant(at), services: Instant::NEVER, parameters: false }
+    }
+
+    #[test]
+    fn work_may_take_a_few_polls() {
+        let mut polls = 0;
+        let next = settle(Instant(100), || {
+            polls += 1;
+            due(if polls < 3 { 100 } else { 101 })
+        });
+        assert_eq!((next.due(), polls), (Instant(101), 3));
+        let next = settle(Instant(100), || due(200));
+        assert_eq!(next.due(), Instant(200));
+    }
+
+    #[test]
+    #[should_panic(expected = "is due")]
+    fn a_deadline_that_stays_in_the_past_is_an_error() {
+        let _ = settle(Instant(100), || due(100));
+    }
+}

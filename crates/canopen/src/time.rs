@@ -20,12 +20,6 @@ impl Duration {
     pub const fn from_inhibit(n: u16) -> Duration {
         Duration(n as u64 * 100)
     }
-
-    /// Whether the span is 0: a timer that is switched off.
-    #[must_use]
-    pub const fn is_zero(self) -> bool {
-        self.0 == 0
-    }
 }
 
 /// Microseconds since start-up. 64 bits do not overflow in the life of a machine. A sum beyond the range is

@@ -71,6 +71,87 @@ fn an_entry_has_type_default_limits_and_mapping() {
     assert!(section("2001sub1").iter().any(|line| line == "DefaultValue=1.5"));
 }
 
+/// Every object that the library has rows for.
+const ALL: &[Object] = canopen::rows!(
+    [
+        objects::device_type(0x0003_0191),
+        objects::error_register(),
+        objects::time_stamp(),
+        objects::device_name("I/O module"),
+        objects::hardware_version("1.0"),
+        objects::software_version("2.1"),
+        objects::heartbeat_producer(1000),
+        objects::start_up(),
+    ],
+    objects::error_field::<3>(),
+    objects::sync_producer(10_000),
+    objects::node_guarding(),
+    objects::emergency(),
+    objects::store_parameters(),
+    objects::restore_parameters(),
+    objects::heartbeat_consumer::<4>(),
+    objects::emcy_consumer::<4>(),
+    objects::identity(7, 0x2B, 0x0001_0002),
+    objects::error_behaviour(2),
+    objects::scanner_list::<3>(),
+    objects::dispatching_list::<3>(),
+    objects::default_sdo_server(),
+    objects::sdo_server(2),
+    objects::sdo_client(1),
+    objects::rpdo(1, &[OUTPUT, OUTPUT]),
+    objects::multiplexed(objects::rpdo(512, &[])),
+    objects::tpdo(1, &[INPUT]),
+    objects::without_remote(objects::tpdo(4, &[INPUT, INPUT])),
+    objects::multiplexed(objects::tpdo(5, &[])),
+    objects::program_data(),
+    objects::program_control(),
+    objects::program_identification(),
+    objects::flash_status(),
+    [INPUT, OUTPUT],
+);
+const INPUT: Object =
+    Object::new(0x6401, 0, "Input", Type::Integer16, Access::ReadOnly).mappable(Mapping::Tpdo);
+const OUTPUT: Object = Object::new(0x6411, 0, "Output", Type::Unsigned32, Access::ReadWrite)
+    .mappable(Mapping::Rpdo)
+    .limits(0, 1000);
+
+/// `tests/all_objects.eds` was compared with CiA 301 by hand. `UPDATE_TABLE=1` writes it.
+#[test]
+fn the_objects_of_the_library_have_the_types_and_defaults_of_cia_301() {
+    let mut sheet = String::new();
+    write(ALL, &DeviceInfo::new("Example", "I/O module"), &mut sheet).unwrap();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all_objects.eds");
+    if std::env::var_os("UPDATE_TABLE").is_some() {
+        std::fs::write(path, &sheet).unwrap();
+    }
+    let expected = std::fs::read_to_string(path).unwrap();
+    let differences = sheet.lines().zip(expected.lines()).find(|(own, expected)| own != expected);
+    assert_eq!((differences, sheet.len()), (None, expected.len()));
+}
+
+/// CiA 301 has the special numbers of mapped objects 254 and 255.
+#[test]
+fn a_multiplexed_pdo_is_one_whose_number_of_objects_says_so() {
+    let has_group_messaging = |row: Object| {
+        let mut sheet = String::new();
+        write(&[row], &DeviceInfo::new("Example", "I/O module"), &mut sheet).unwrap();
+        sheet.lines().any(|line| line == "GroupMessaging=1")
+    };
+    for index in [0x1600, 0x17FF, 0x1A00, 0x1BFF] {
+        let count = |used| Object::new(index, 0, "", Type::Unsigned8, Access::ReadWrite).value(used);
+        assert!(has_group_messaging(count(254)) && has_group_messaging(count(255)), "{index:04X}h");
+        assert!(!has_group_messaging(count(8)) && !has_group_messaging(count(0)), "{index:04X}h");
+        assert!(
+            !has_group_messaging(Object::new(index, 1, "", Type::Unsigned32, Access::ReadWrite).value(254)),
+            "{index:04X}h:1"
+        );
+    }
+    for index in [0x15FF, 0x1800, 0x19FF, 0x1C00] {
+        let other = Object::new(index, 0, "", Type::Unsigned8, Access::ReadWrite).value(255);
+        assert!(!has_group_messaging(other), "{index:04X}h");
+    }
+}
+
 #[test]
 fn keys_without_a_row_are_the_vendors() {
     let mut info = DeviceInfo::new("Example", "I/O module");

@@ -200,17 +200,11 @@ type Table = Vec<Option<&'static Block>>;
 
 /// The block at an address.
 pub(crate) fn find(variant: Variant, address: u32) -> Option<&'static Block> {
-    static TABLES: LazyLock<[Table; 3]> =
-        LazyLock::new(|| [Variant::F405, Variant::F407, Variant::F446].map(table));
+    static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| Variant::ALL.into_iter().map(table).collect());
     if !TABLE.contains(&address) {
         return search(variant, address);
     }
-    let chip = match variant {
-        Variant::F405 => 0,
-        Variant::F407 => 1,
-        Variant::F446 => 2,
-    };
-    let block = TABLES[chip][((address - TABLE.start) / STEP) as usize]?;
+    let block = TABLES[variant as usize][((address - TABLE.start) / STEP) as usize]?;
     (address - block.base < block.size).then_some(block)
 }
 

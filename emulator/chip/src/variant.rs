@@ -14,17 +14,28 @@ pub enum Variant {
     F407,
 }
 
+impl Variant {
+    /// The chips, each at the place of its discriminant.
+    pub(crate) const ALL: [Variant; 3] = [Variant::F446, Variant::F405, Variant::F407];
+
+    /// The name of the chip in the features of the images.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Variant::F446 => "stm32f446",
+            Variant::F405 => "stm32f405",
+            Variant::F407 => "stm32f407",
+        }
+    }
+}
+
 impl FromStr for Variant {
     type Err = String;
 
-    /// The name of the chip in the features of the images.
     fn from_str(name: &str) -> Result<Variant, String> {
-        match name {
-            "stm32f446" => Ok(Variant::F446),
-            "stm32f405" => Ok(Variant::F405),
-            "stm32f407" => Ok(Variant::F407),
-            other => Err(format!("{other:?} is no chip; stm32f446, stm32f405 and stm32f407 are")),
-        }
+        let found = Variant::ALL.into_iter().find(|chip| chip.name() == name);
+        found
+            .ok_or_else(|| format!("{name:?} is no chip; {} are", Variant::ALL.map(Variant::name).join(", ")))
     }
 }
 

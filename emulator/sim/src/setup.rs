@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 use anyhow::{Context, Result, ensure};
-use bsp::boards::{Button, Chip, Light, Pull};
+use bsp::boards::{Button, Light, Pull};
 use chip::{Board as Wiring, ButtonPin, FrontEnd, Stm32f4, Variant};
 use storage::{DeviceRecord, Memory, Pages};
 
@@ -98,12 +98,7 @@ fn chip(node: &Node, options: &Options) -> Stm32f4 {
 
 /// The board that the images for a chip are built for: the same description as theirs.
 fn image_board(chip: Variant) -> bsp::boards::Board {
-    let wanted = match chip {
-        Variant::F446 => Chip::F446,
-        Variant::F405 => Chip::F405,
-        Variant::F407 => Chip::F407,
-    };
-    let found = bsp::boards::ALL.into_iter().find(|(_, board)| board.chip == wanted);
+    let found = bsp::boards::ALL.into_iter().find(|(_, board)| board.chip.name == chip.name());
     found.map_or(*bsp::boards::ALL[0].1, |(_, board)| *board)
 }
 

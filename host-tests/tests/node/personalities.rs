@@ -97,3 +97,15 @@ fn a_failed_store_is_reported_and_changes_nothing() {
     assert_eq!(bench.take(), [(0x580 + u16::from(ID), vec![0x80, 0, 0x20, 0, 0, 0, 6, 6])]);
     assert_eq!(personality(&mut bench), 0);
 }
+
+#[test]
+fn the_transfer_buffer_of_every_personality_returns_the_data_of_a_download() {
+    const NO_DATA: u32 = 0x0800_0024;
+    let data: Vec<u8> = (0..100).collect();
+    for personality in Personality::ALL {
+        let mut bench = Bench::booted_as(personality);
+        assert_eq!(bench.read(0x2F00, 0), Err(NO_DATA), "{personality:?}");
+        bench.write(0x2F00, 0, &data).unwrap();
+        assert_eq!(bench.read(0x2F00, 0), Ok(data.clone()), "{personality:?}");
+    }
+}

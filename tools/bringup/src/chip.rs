@@ -1,6 +1,6 @@
 //! The registers that the steps read (RM0390, RM0090), and what a running node has in them.
 
-use bsp::boards::{ALL, Chip as Family};
+use bsp::boards::ALL;
 
 /// CPUID of a Cortex-M4 r0p1 (ARM DDI 0439, 4.1).
 pub const CPUID: (u32, u32) = (0xE000_ED00, 0x410F_C241);
@@ -50,17 +50,11 @@ impl Chip {
     /// The chip that probe-rs calls so.
     #[must_use]
     pub fn named(name: &str) -> Option<Chip> {
-        let name = name.to_ascii_uppercase();
-        let families = [
-            ("STM32F446", Family::F446, 0x421),
-            ("STM32F405", Family::F405, 0x413),
-            ("STM32F407", Family::F407, 0x413),
-        ];
-        let (_, family, device) = families.into_iter().find(|(prefix, ..)| name.starts_with(prefix))?;
-        let (_, board) = ALL.into_iter().find(|(_, board)| board.chip == family)?;
+        let name = name.to_ascii_lowercase();
+        let (_, board) = ALL.into_iter().find(|(_, board)| name.starts_with(board.chip.name))?;
         // The letter of the flash size: E 512 KiB, G 1 MiB.
-        let flash = if name.chars().nth(10) == Some('E') { 512 } else { 1024 };
-        Some(Chip { device, flash, bypass: board.oscillator.is_bypassed })
+        let flash = if name.chars().nth(10) == Some('e') { 512 } else { 1024 };
+        Some(Chip { device: board.chip.device, flash, bypass: board.oscillator.is_bypassed })
     }
 }
 

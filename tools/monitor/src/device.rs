@@ -300,7 +300,8 @@ impl Device {
         self.is_injected = false;
         self.channel.reset();
         let id = self.id;
-        let early: Vec<_> = self.early.drain(..).filter(|(node, _)| Some(*node) == id).collect();
+        let early = self.early.drain(..).filter(|(node, _)| Some(*node) == id);
+        let early: Vec<_> = early.filter(|(_, request)| !self.channel.is_stray(request[0])).collect();
         match early.as_slice() {
             [] => (),
             // The answer has no deadline.

@@ -27,7 +27,7 @@ impl Heartbeat {
 
     /// The span in which a missing heartbeat should have been sent; once for each heartbeat.
     pub(crate) fn overdue(&mut self, period: Duration, now: Instant) -> Option<(Instant, Instant)> {
-        let last = self.last.filter(|_| !period.is_zero() && !self.is_reported)?;
+        let last = self.last.filter(|_| period.0 > 0 && !self.is_reported)?;
         let (due, late) = (last + period, last + Duration(period.0 * 3 / 2));
         if now <= late {
             return None;

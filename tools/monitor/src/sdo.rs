@@ -15,6 +15,8 @@ const TIME_OUT: u64 = 1_000_000;
 /// The longest time in us between two segments of a block that are on their way. A server gives a client that pauses
 /// longer.
 const IN_A_ROW: u64 = 100_000;
+/// How many segments a server may miss while it starts.
+const LOST: u8 = 16;
 
 /// The server's next frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,8 +86,16 @@ pub(crate) struct Channel {
     since: Instant,
     /// Answers to requests before that may still be on their way: the client did not wait for them.
     crossing: u16,
-    /// The server has aborted a block download within a block. The next segment of the block that may still be on its way.
-    stray: Option<u8>,
+    stray: Option<Stray>,
+}
+
+/// The server has ended a block download within a block, of which further segments may still be on their way.
+#[derive(Clone, Copy, Debug)]
+struct Stray {
+    /// The sequence number of the next segment.
+    next: u8,
+    /// Whether the end of the block may be answered: a reset has ended the transfer without an abort message.
+    is_answered: bool,
 }
 
 impl Channel {
@@ -93,9 +103,16 @@ impl Channel {
         Channel { transfer: None, expect: Expect::Anything, since: Instant(0), crossing: 0, stray: None }
     }
 
-    /// The server has restarted: there is no transfer.
+    /// The server has restarted: there is no transfer, but the client may still be sending a block.
     pub(crate) fn reset(&mut self) {
-        *self = Channel { expect: Expect::Nothing, ..Channel::new() };
+        self.give_up();
+        *self = Channel { expect: Expect::Nothing, since: self.since, stray: self.stray, ..Channel::new() };
+    }
+
+    /// The sequence number of the next segment of a block download.
+    fn next_segment(&self) -> Option<u8> {
+        let transfer = self.transfer.as_ref().filter(|_| self.expect == Expect::Nothing)?;
+        self.is_within_block_download().then_some(transfer.block.len() as u8 + 1)
     }
 
     /// The object whose request is without an answer since a second; `None` without such an object. A request is reported
@@ -118,6 +135,8 @@ impl Channel {
 
     /// Expects nothing any more.
     pub(crate) fn give_up(&mut self) {
+        let rest = self.next_segment().map(|next| Stray { next, is_answered: true });
+        self.stray = rest.or(self.stray);
         self.expect = Expect::Anything;
     }
 
@@ -156,11 +175,17 @@ impl Channel {
         }
     }
 
-    /// Whether a frame is a segment of a block that the server has aborted. No answer to it is due.
-    fn is_stray(&mut self, command: u8) -> bool {
-        let next = self.stray.take().filter(|next| *next == command & 0x7F);
-        self.stray = next.map(|next| next + 1).filter(|_| command & 0x80 == 0);
-        next.is_some()
+    /// Whether a frame is a segment of a block that the server has ended. No answer to it is due.
+    pub(crate) fn is_stray(&mut self, command: u8) -> bool {
+        let sequence = command & 0x7F;
+        let follows = |stray: &Stray| (stray.next..stray.next.saturating_add(LOST)).contains(&sequence);
+        let Some(stray) = self.stray.take().filter(follows) else { return false };
+        let is_end = command & 0x80 != 0 || sequence == 127;
+        if is_end && stray.is_answered {
+            self.crossing = self.crossing.saturating_add(1);
+        }
+        self.stray = (!is_end).then_some(Stray { next: sequence + 1, ..stray });
+        true
     }
 
     fn is_within_block_download(&self) -> bool {
@@ -307,7 +332,8 @@ impl Channel {
             return None;
         };
         let within_block = transfer.mode == Mode::Block && self.expect == Expect::Nothing;
-        self.stray = (within_block && transfer.is_download).then_some(transfer.block.len() as u8 + 1);
+        let next = transfer.block.len() as u8 + 1;
+        self.stray = (within_block && transfer.is_download).then_some(Stray { next, is_answered: false });
         self.expect = Expect::Nothing;
         transfer.is_download.then_some(Event::Aborted(transfer.key, transfer.data))
     }

@@ -39,6 +39,7 @@ pub mod rules;
 pub mod scan;
 pub mod sdo;
 pub mod simulate;
+mod steadiness;
 pub mod text;
 pub mod tpdo;
 pub mod trace;

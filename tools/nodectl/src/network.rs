@@ -12,6 +12,7 @@ use canopen::{Duration, Frame, Instant, NodeId};
 use crate::bus::{Bus, BusError, Received};
 use crate::other_clients::OtherClients;
 use crate::sdo::Channel;
+use crate::steadiness::Steadiness;
 
 /// The number of frames that are kept for later; the oldest frames are dropped first.
 const KEPT: usize = 4096;
@@ -69,6 +70,7 @@ pub struct Network {
     /// Time stamp of the newest frame, and the time of its arrival.
     newest: Option<(Instant, Instant)>,
     log: Option<Vec<Logged>>,
+    steadiness: Steadiness,
     others: OtherClients,
     heard: BTreeMap<NodeId, Heard>,
     gate: Box<dyn FnMut() -> Gate>,
@@ -92,6 +94,7 @@ impl Network {
             kept,
             newest: None,
             log: None,
+            steadiness: Steadiness::default(),
             others: OtherClients::default(),
             heard: BTreeMap::new(),
             gate: Box::new(|| Gate::Open),
@@ -238,6 +241,14 @@ impl Network {
     /// Begins a log of all frames, sent and received. A former log is dropped.
     pub fn begin_log(&mut self) {
         self.log = Some(Vec::new());
+        self.steadiness = Steadiness::since(self.newest);
+    }
+
+    /// The longest time since [`begin_log`](Network::begin_log) for which this computer, the adapter or a simulated bus
+    /// stood still: frames arrived that much later than others after their time stamps, or a pause was that much longer.
+    #[must_use]
+    pub fn stall(&self) -> Duration {
+        self.steadiness.stall()
     }
 
     /// The frames since [`begin_log`](Network::begin_log), in their order.
@@ -357,7 +368,9 @@ impl Network {
     /// The bus is lost.
     pub fn pause(&mut self, time: Duration) -> Result<(), BusError> {
         let until = self.now() + time;
-        self.wait(until, |_| None::<()>).map(drop)
+        self.wait(until, |_| None::<()>)?;
+        self.steadiness.on_pause(until, self.now());
+        Ok(())
     }
 
     fn hear(&mut self, frame: &Frame) {
@@ -376,6 +389,7 @@ impl Network {
         if let Some(received) = received {
             let here = self.bus.now();
             self.newest = Some((received.at, here));
+            self.steadiness.on_frame(received.at, here);
             self.hear(&received.frame);
             self.others.on_frame(&received.frame, here);
             // After a boot, an additional SDO server may be off again.

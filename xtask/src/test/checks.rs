@@ -87,12 +87,12 @@ fn lint_images() -> Result<()> {
 
 fn build_other_chips() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
-    images::OTHER_CHIPS.iter().try_for_each(|chip| images::compile_for(&toolchain, chip).map(|_| ()))
+    images::OTHER_CHIPS.iter().try_for_each(|(chip, _)| images::compile_for(&toolchain, chip).map(|_| ()))
 }
 
 /// Checks that the images for another chip compile. `--thorough` links the images and runs them.
 fn check_other_chip() -> Result<()> {
-    let [chip, _] = images::OTHER_CHIPS;
+    let [(chip, _), _] = images::OTHER_CHIPS;
     images::check_for(&Toolchain::ensure()?, chip)
 }
 

@@ -51,15 +51,28 @@ pub struct Board {
     pub front_end: FrontEnd,
 }
 
-/// A chip.
+/// A chip, with everything in which it differs from the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Chip {
+pub struct Chip {
+    /// The name, without package and size of the flash.
+    pub name: &'static str,
+    /// The device in `DBGMCU_IDCODE` (RM0390, 33.6.1; RM0090, 38.6.1).
+    pub device: u32,
+    /// The ADC channel of the temperature sensor (RM0390, 13.10; RM0090, 13.10).
+    pub temperature_channel: u8,
+    /// Whether revision A can prefetch (ES0182: ART accelerator prefetch queue instruction is not supported).
+    pub revision_a_prefetches: bool,
+}
+
+impl Chip {
     /// STM32F446.
-    F446,
+    pub const F446: Chip =
+        Chip { name: "stm32f446", device: 0x421, temperature_channel: 18, revision_a_prefetches: true };
     /// STM32F405.
-    F405,
-    /// STM32F407.
-    F407,
+    pub const F405: Chip =
+        Chip { name: "stm32f405", device: 0x413, temperature_channel: 16, revision_a_prefetches: false };
+    /// STM32F407: the F405 with Ethernet and a camera interface.
+    pub const F407: Chip = Chip { name: "stm32f407", ..Chip::F405 };
 }
 
 /// A source of the clock at `OSC_IN`.

@@ -5,7 +5,7 @@ use cortex_m::peripheral::SCB;
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 
 use super::{led, retained};
-use crate::boards::{BOARD, Chip};
+use crate::boards::BOARD;
 
 /// 144 MHz from HSE: 2 MHz * 144 / 2. APB1 has a quarter of this clock, because the bit rates need it, APB2 a half.
 const DIVIDER_M: u8 = (BOARD.oscillator.hertz / 2_000_000) as u8;
@@ -71,12 +71,11 @@ fn try_again() -> ! {
     SCB::sys_reset()
 }
 
-/// Revision A of STM32F405 and F407 must not prefetch (ES0182: ART accelerator prefetch queue instruction is not
-/// supported). The STM32F446 can.
+/// Whether this revision of the chip can prefetch.
 fn can_prefetch() -> bool {
     const REVISION_A: u16 = 0x1000;
     // SAFETY: a read of a constant.
-    matches!(BOARD.chip, Chip::F446)
+    BOARD.chip.revision_a_prefetches
         || unsafe { (*DBGMCU::ptr()).idcode().read().rev_id().bits() } != REVISION_A
 }
 

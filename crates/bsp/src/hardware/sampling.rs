@@ -8,7 +8,7 @@ use stm32f4xx_hal::gpio::{Analog, PA0, PA1, PC2};
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2, TIM3};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use crate::boards::{BOARD, Chip};
+use crate::boards::BOARD;
 use crate::losses::{Event, Losses};
 pub(super) use crate::oversampling::SCANS;
 use crate::oversampling::{self, CHANNELS, WORDS, sums};
@@ -18,19 +18,13 @@ const SCAN: [Conversion; CHANNELS] = [
     Conversion { channel: 0, time: EXTERNAL },
     Conversion { channel: 1, time: EXTERNAL },
     Conversion { channel: 12, time: EXTERNAL },
-    Conversion { channel: TEMPERATURE, time: INTERNAL },
+    Conversion { channel: BOARD.chip.temperature_channel, time: INTERNAL },
     Conversion { channel: 17, time: INTERNAL },
 ];
 /// Conversions in a half of the buffer.
 const HALF: usize = SCANS * CHANNELS;
 /// Counts of TIM3 between two scans: 72 MHz / 16 kHz.
 const PERIOD: u16 = 4500;
-
-/// Channel of the temperature sensor (RM0390, 13.10; RM0090, 13.10).
-const TEMPERATURE: u8 = match BOARD.chip {
-    Chip::F446 => 18,
-    Chip::F405 | Chip::F407 => 16,
-};
 
 /// A channel and its sampling time.
 #[derive(Clone, Copy)]

@@ -164,7 +164,9 @@ mod tests {
         assert_eq!(heard(a, 0x7F, 10), Some(Event::State(a, State::PreOperational)));
         assert_eq!(heard(a, 0x7F, 20), None);
         assert_eq!(heard(b, 5, 20), Some(Event::State(b, State::Operational)));
-        assert_eq!(heard(c, 5, 20), None);
+        assert_eq!(heard(c, 4, 20), None);
+        let states = [a, b, c].map(|node| supervisor.state(node));
+        assert_eq!(states, [Some(State::PreOperational), Some(State::Operational), None]);
         assert_eq!((supervisor.due(), supervisor.expire(Instant(119))), (Instant(120), None));
         assert_eq!(supervisor.expire(Instant(250)), Some(Event::Lost(a)));
         assert_eq!(supervisor.expire(Instant(250)), Some(Event::Lost(b)));

@@ -49,6 +49,12 @@ impl Receiver {
         !self.is_complete
     }
 
+    /// The highest sequence number that has arrived in this block; 0 before the first.
+    pub(super) fn highest(&self) -> u8 {
+        let newest = self.newest.as_ref().map_or(0, |segment| segment.sequence.get());
+        (self.next - 1).max(if self.has_begun { newest } else { 0 })
+    }
+
     /// Whether a block has begun and is not complete. If its last segment is lost, only a time-out can end the block.
     pub(super) fn is_within_block(&self) -> bool {
         self.expects_segments() && self.has_begun

@@ -19,6 +19,11 @@ const TIME_OUT: Span = Span::from_millis(1000);
 /// segments that have arrived.
 const BLOCK_PAUSE: Span = Span::from_millis(300);
 
+/// How long the client of an interrupted block may be silent within it.
+const REST_PAUSE: Span = Span::from_millis(100);
+/// How many segments may be lost while a reset of the communication interrupts a block.
+const LOST: u8 = 16;
+
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
 pub(crate) struct Server<O> {
@@ -44,9 +49,13 @@ enum Transfer {
     Upload(Upload),
     Download(Download),
     BlockUpload(Sender),
-    BlockDownload(Receiver),
     /// All data has arrived. The reply waits until the device has carried out the write.
     Deferred,
+    // The last two together: every frame asks whether it may be a segment of a block, with one comparison.
+    BlockDownload(Receiver),
+    /// None: a reset has interrupted a block. The client may still be sending it, so its next segments are no requests.
+    /// The sequence number of the last one.
+    Interrupted(u8),
 }
 
 /// Whether there is a reply now.
@@ -78,17 +87,17 @@ impl<O: Objects> Server<O> {
 
     /// Whether no transfer is under way.
     pub(crate) fn is_idle(&self) -> bool {
-        matches!(self.transfer, Transfer::Idle)
+        matches!(self.transfer, Transfer::Idle | Transfer::Interrupted(_))
     }
 
     /// Whether no transfer is under way, or one whose response waits for [`release`](Server::release).
     pub(crate) fn is_between_requests(&self) -> bool {
-        matches!(self.transfer, Transfer::Idle | Transfer::Deferred)
+        self.is_idle() || matches!(self.transfer, Transfer::Deferred)
     }
 
-    /// Whether a block download is under way.
+    /// Whether a block download is under way, or one was interrupted.
     pub(crate) fn takes_block(&self) -> bool {
-        O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::BlockDownload(_))
+        O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::BlockDownload(_) | Transfer::Interrupted(_))
     }
 
     /// Whether the client is sending a block.
@@ -102,7 +111,7 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(crate) fn deadline(&self) -> Tick {
         match &self.transfer {
-            Transfer::Idle => Tick::NEVER,
+            Transfer::Idle | Transfer::Interrupted(_) => Tick::NEVER,
             _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
             _ => self.active.plus(TIME_OUT),
         }
@@ -110,8 +119,18 @@ impl<O: Objects> Server<O> {
 
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
     pub(crate) fn reset(&mut self, objects: &mut O) {
+        let rest = match &self.transfer {
+            Transfer::BlockDownload(receiver) if O::BLOCK_DOWNLOAD && receiver.expects_segments() => {
+                Transfer::Interrupted(receiver.highest())
+            }
+            Transfer::Interrupted(last) if O::BLOCK_DOWNLOAD => Transfer::Interrupted(*last),
+            _ => {
+                self.multiplexer = Multiplexer { index: 0, sub: 0 };
+                Transfer::Idle
+            }
+        };
         self.abandon(objects);
-        self.multiplexer = Multiplexer { index: 0, sub: 0 };
+        self.transfer = rest;
         (self.previous, self.is_answered) = ([0; 8], false);
     }
 
@@ -119,12 +138,30 @@ impl<O: Objects> Server<O> {
     /// frame was taken; if not, [`answer`](Server::answer) takes it. The deadline does not become earlier.
     #[inline]
     pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Tick) -> bool {
-        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return false };
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return self.take_rest(frame, now) };
         let is_taken = receiver.take_next(frame, &mut self.buffer);
         if is_taken {
             self.active = now;
         }
         is_taken
+    }
+
+    /// Takes a segment of an interrupted block. [`answer`](Server::answer) takes the end of the block, after which the
+    /// client listens, and a frame that does not continue the block: it is a request.
+    #[inline(never)]
+    fn take_rest(&mut self, frame: &[u8; 8], now: Tick) -> bool {
+        let Transfer::Interrupted(last) = self.transfer else { return false };
+        let rest = BlockSegment::parse(*frame).filter(|segment| {
+            (1..=LOST).contains(&segment.sequence.get().wrapping_sub(last))
+                && now < self.active.plus(REST_PAUSE)
+        });
+        let is_end = rest.is_some_and(|segment| segment.last || segment.sequence == BlockSize::MAX);
+        if !is_end {
+            self.transfer =
+                rest.map_or(Transfer::Idle, |segment| Transfer::Interrupted(segment.sequence.get()));
+            self.active = now;
+        }
+        rest.is_some() && !is_end
     }
 
     /// Takes a request. Returns whether there is a reply.
@@ -145,6 +182,9 @@ impl<O: Objects> Server<O> {
     /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
     fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
+        if O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::Interrupted(_)) {
+            return self.give_up(Abort::DeviceState, objects);
+        }
         let is_repeated = *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
@@ -210,7 +250,7 @@ impl<O: Objects> Server<O> {
                 Transfer::BlockUpload(sender) => sender.source().close(false, objects),
                 Transfer::Download(download) => download.sink().abandon(objects),
                 Transfer::BlockDownload(receiver) => receiver.sink().abandon(objects),
-                Transfer::Idle | Transfer::Deferred => (),
+                Transfer::Idle | Transfer::Interrupted(_) | Transfer::Deferred => (),
             }
         }
         self.transfer = Transfer::Idle;

@@ -56,6 +56,8 @@ pub(crate) struct Numbers {
     pub(crate) events: VecDeque<[u8; 4]>,
     /// An object that multiplexed TPDOs do not send to all nodes.
     pub(crate) not_told: Option<Multiplexer>,
+    /// The multiplexed RPDO that takes the frames of all nodes; 0 for none.
+    pub(crate) all_nodes_rpdo: u16,
 }
 
 impl Application for Numbers {
@@ -71,6 +73,10 @@ impl Application for Numbers {
 
     fn initialise(&mut self, image: &mut [u8]) {
         DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
+    }
+
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        rpdo == self.all_nodes_rpdo
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use canopen::lss::BitRate;
 use canopen::sdo::{Abort, Multiplexer, Request, Response};
 use canopen::testing::settle;
 use canopen::{
@@ -61,10 +62,19 @@ pub(crate) struct Bench {
 impl Bench {
     /// A device that has booted and whose boot-up message has been taken.
     pub(crate) fn booted() -> Bench {
-        let mut bench = Bench::unstarted();
-        bench.start();
-        bench.take();
-        bench
+        Bench::unstarted().boot()
+    }
+
+    /// A device that has booted with this configured bit rate.
+    pub(crate) fn booted_at(bit_rate: BitRate) -> Bench {
+        let device = Device::new(&DICTIONARY, NodeId::new(ID), Numbers::default()).with_bit_rate(bit_rate);
+        Bench { device, ..Bench::unstarted() }.boot()
+    }
+
+    fn boot(mut self) -> Bench {
+        self.start();
+        self.take();
+        self
     }
 
     pub(crate) fn operational() -> Bench {

@@ -263,16 +263,24 @@ fn a_refused_segment_is_answered_at_the_end_of_its_block() {
         // The next segment has a byte too many.
         let size = u32::from(accepted) * 7 + 6;
         client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(size) });
-        // Segment 2Bh looks like the download of a value, segments 40h to 5Fh like the upload.
-        let content = [0x00, 0x61, 0x00, 0x03, 0x00, 0x00, 0x00];
-        for sequence in 1..=126 {
-            assert_eq!(client.send_segment(middle(content, sequence)), None, "after {accepted}");
-        }
-        let refused = client.send_segment(middle(content, 127));
-        assert_eq!(refused, Some(Response::Abort(DOMAIN, 0x0607_0012)), "after {accepted}");
-        assert_eq!(client.bench.device.application().downloads, 0);
-        assert_eq!(client.bench.read(0x6100, 0), Ok(vec![0, 0]), "after {accepted}");
+        assert_no_request(&mut client, 1, 0x0607_0012);
     }
+}
+
+/// Segment 2Bh looks like the download of a value, segments 40h to 5Fh like the upload.
+const LIKE_REQUESTS: [u8; 7] = [0x00, 0x61, 0x00, 0x03, 0x00, 0x00, 0x00];
+
+/// Sends the block from this segment on. The server takes none for a request, and aborts at the end of the block.
+#[track_caller]
+fn assert_no_request(client: &mut Client, first: u8, code: u32) {
+    for sequence in first..=126 {
+        let answer = client.send_segment(middle(LIKE_REQUESTS, sequence));
+        assert_eq!(answer, None, "{sequence} from {first} on");
+    }
+    let end = client.send_segment(middle(LIKE_REQUESTS, 127));
+    assert_eq!(end, Some(Response::Abort(DOMAIN, code)), "from {first} on");
+    assert_eq!(client.bench.device.application().downloads, 0);
+    assert_eq!(client.bench.read(0x6100, 0), Ok(vec![0, 0]), "from {first} on");
 }
 
 /// A client that ends a refused block early gets the abort message after the pause.
@@ -285,6 +293,43 @@ fn a_refused_block_without_its_end_is_aborted_after_the_pause() {
     }
     assert_eq!(client.wait(), Some(Response::Abort(DOMAIN, 0x0607_0012)));
     assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]));
+}
+
+/// A master resets the node within a block, and the client sends the rest of the block. Some segments are lost while the node
+/// starts.
+#[test]
+fn the_rest_of_a_block_after_a_reset_is_no_request() {
+    for accepted in 0..=120_u8 {
+        for lost in [0, 5] {
+            let mut client = Client::new();
+            client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+            for sequence in 1..=accepted {
+                client.send_segment(middle(LIKE_REQUESTS, sequence));
+            }
+            client.bench.nmt(0x82);
+            client.bench.start();
+            assert_no_request(&mut client, accepted + 1 + lost, 0x0800_0022);
+        }
+    }
+}
+
+/// A client that has seen the boot-up message begins again.
+#[test]
+fn a_request_after_a_reset_within_a_block_is_answered() {
+    for pause in [0, 400] {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+        for sequence in 1..=if pause == 0 { 3 } else { 0x3F } {
+            client.send_segment(middle([0; 7], sequence));
+        }
+        client.bench.nmt(0x82);
+        client.bench.start();
+        client.bench.run(Duration::from_millis(pause));
+        client.bench.take();
+        assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]), "after {pause} ms");
+        assert_eq!(client.bench.write(0x6100, 0, &[3, 0]), Ok(()), "after {pause} ms");
+        assert_eq!(client.download(DOMAIN, &data(900)), Response::BlockDownloaded);
+    }
 }
 
 #[test]

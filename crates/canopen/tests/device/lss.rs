@@ -176,6 +176,18 @@ fn a_store_is_answered_after_its_end() {
 }
 
 #[test]
+fn a_store_of_a_new_node_id_keeps_the_configured_bit_rate() {
+    let bit_rate = BitRate::from_kbit(125).unwrap();
+    let mut bench = Bench::booted_at(bit_rate);
+    bench.take_action();
+    configuration(&mut bench, true);
+    send(&mut bench, Request::NodeId(9));
+    send(&mut bench, Request::Store);
+    let configuration = Configuration { node_id: NodeId::new(9), bit_rate };
+    assert_eq!(bench.take_action(), Some(Action::Store(Job::Configure(configuration))));
+}
+
+#[test]
 fn two_stores_at_once_are_one_too_many() {
     let mut bench = Bench::booted();
     assert_eq!(bench.ask_raw([0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e']), None);

@@ -23,6 +23,7 @@ mod multiplexed;
 mod nmt;
 mod own_groups;
 mod producers;
+mod program;
 mod requests;
 mod robustness;
 mod rows;

@@ -137,6 +137,45 @@ fn one_for_another_node_or_by_source_is_not() {
     }
 }
 
+/// Makes RPDO 1 a multiplexed PDO that takes the frames of all nodes.
+fn receiver_of_all() -> Bench {
+    let mut bench = Bench::operational();
+    bench.device.application_mut().all_nodes_rpdo = 1;
+    bench.write(0x1600, 0, &[DESTINATION]).unwrap();
+    bench.write32(0x1400, 1, RPDO.into()).unwrap();
+    bench.take();
+    bench
+}
+
+#[test]
+fn the_rpdo_for_all_nodes_takes_its_function_code_from_each_of_127_nodes() {
+    let mut bench = receiver_of_all();
+    for node in 1..=127 {
+        bench.receive(Frame::new(0x200 + u16::from(node), &[0x80, 0x00, 0x62, 0, node, 0, 0, 0]).unwrap());
+        assert_eq!(value(&bench), node.into());
+    }
+    let ids: Vec<u16> = bench.device.process_ids().map(canopen::CanId::get).collect();
+    assert!((0x201..=0x27F).all(|id| ids.contains(&id)), "{ids:03X?}");
+    assert!(!ids.contains(&0x280) && !ids.contains(&0x200), "{ids:03X?}");
+    let filters = bench.device.process_filters().map(|(id, mask)| (id.get(), mask));
+    assert_eq!(filters.filter(|&(_, mask)| mask != 0x7FF).collect::<Vec<_>>(), [(RPDO, 0x780)]);
+}
+
+/// Whatever bits the CAN-ID shares with the one of the RPDO. Node-ID 0 is no node.
+#[test]
+fn the_rpdo_for_all_nodes_takes_no_other_function_code_and_no_other_pdo() {
+    for id in [0x085, 0x105, 0x185, 0x200, 0x285, 0x305, 0x385, 0x405, 0x505, 0x705] {
+        let mut bench = receiver_of_all();
+        bench.receive(Frame::new(id, &[0x80, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap());
+        assert_eq!(value(&bench), 0, "{id:03X}h");
+    }
+    // RPDO 2 has this CAN-ID, and its mapping takes nothing from it.
+    let mut bench = receiver_of_all();
+    bench.write32(0x1401, 1, 0x210).unwrap();
+    bench.receive(Frame::new(0x210, &[0x80, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap());
+    assert_eq!(value(&bench), 0);
+}
+
 #[test]
 fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
     for (address, expected) in [(0x80 | ID, vec![0x8230]), (0x80, vec![])] {

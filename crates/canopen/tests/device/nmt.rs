@@ -292,3 +292,41 @@ fn error_behaviour_has_the_limits_of_its_sub_indexes() {
     assert_eq!(bench.write(0x1029, 1, &[255]), Err(0x0609_0031));
     assert_eq!(bench.write(0x1029, 2, &[3]), Err(0x0609_0031));
 }
+
+/// The communication parameters are those of the group, wherever the objects are.
+#[test]
+fn a_reset_of_the_communication_resets_the_parameters_of_the_group_alone() {
+    let mut bench = Bench::booted();
+    bench.write(0x1017, 0, &[0xF4, 0x01]).unwrap();
+    bench.write(0x5F01, 0, &[9]).unwrap();
+    bench.write(0x6100, 0, &[4, 0]).unwrap();
+    bench.take_parameters();
+    bench.nmt(0x82);
+    bench.start();
+    assert!(bench.take_parameters(), "the application learns of it");
+    assert_eq!(bench.read(0x1017, 0), Ok(vec![0xE8, 0x03]));
+    assert_eq!(bench.read(0x5F01, 0), Ok(vec![3]));
+    assert_eq!(bench.read(0x6100, 0), Ok(vec![4, 0]));
+}
+
+/// A pause, as for the erase of a flash page, disturbs no client, no heartbeat, and no PDO.
+#[test]
+fn a_pause_is_possible_between_requests_outside_of_operational() {
+    let mut bench = Bench::booted();
+    let can_pause = |bench: &Bench, ms| bench.device.can_pause(Duration::from_millis(ms), bench.now);
+    // The last heartbeat was at the start, and the time is 1000 ms.
+    assert!(can_pause(&bench, 1500) && !can_pause(&bench, 1501));
+    bench.nmt(2);
+    assert!(can_pause(&bench, 1500), "in Stopped");
+    bench.nmt(1);
+    assert!(!can_pause(&bench, 1), "in Operational");
+    bench.nmt(0x80);
+    assert!(can_pause(&bench, 1500));
+    // The name of the device has more than four bytes.
+    bench.ask_raw([0x40, 0x08, 0x10, 0, 0, 0, 0, 0]).unwrap();
+    assert!(!can_pause(&bench, 1), "within a transfer");
+    bench.receive(Frame::new(0x605, &[0x80, 0x08, 0x10, 0, 0, 0, 0, 0]).unwrap());
+    assert!(can_pause(&bench, 1500), "after its end");
+    bench.write(0x1017, 0, &[0, 0]).unwrap();
+    assert!(can_pause(&bench, 3_600_000), "without heartbeats");
+}

@@ -83,6 +83,7 @@ pub(crate) const ROWS: &[Object] = &[
     parameter(0x1FD0, 1, Type::Unsigned64),
     parameter(0x1FD0, 2, Type::Unsigned64),
     Object::new(0x5F00, 0, "", Type::Unsigned8, Access::ReadWrite).limits(0, 2).setting(),
+    parameter(0x5F01, 0, Type::Unsigned8).value(3),
     Object::highest(0x6000, 3, ""),
     value(0x6000, 1, Type::Integer32),
     value(0x6000, 2, Type::Integer16),

@@ -1,6 +1,7 @@
 //! TPDOs: transmission types, timers, remote frames.
 
 use crate::bench::Bench;
+use canopen::lss::BitRate;
 use canopen::{Duration, Frame};
 
 const TPDO: u16 = 0x185;
@@ -33,6 +34,54 @@ fn it_is_sent_on_entering_operational_and_by_its_event_timer() {
         assert_eq!(sent(&mut bench), [[0; 4]]);
         bench.set_value(1, &[1, 2, 3, 4]);
         assert_eq!(bench.times_of(TPDO, Duration::from_millis(350)), [100_000, 200_000, 300_000]);
+    }
+}
+
+/// A change every 50 us: three quarters of the bus at most, and services between the PDOs.
+#[test]
+fn a_queue_that_replaces_nothing_has_a_share_of_the_bus() {
+    for kbit in [1000, 500, 125] {
+        let mut bench = bench(255, 0, 0);
+        bench.device.set_bus_bit_rate(BitRate::from_kbit(kbit).unwrap());
+        bench.take();
+        let (mut bits, mut last) = (0, vec![]);
+        for number in 0..20_000_u32 {
+            bench.set_value(1, &number.to_le_bytes());
+            bench.run(Duration(50));
+            for data in sent(&mut bench) {
+                (bits, last) = (bits + 55 + 10 * data.len(), data);
+            }
+        }
+        let may = usize::from(kbit) * 1000 * 3 / 4;
+        assert!((may * 4 / 5..=may * 21 / 20).contains(&bits), "{kbit} kbit/s: {bits} bits in a second");
+        bench.run(MS);
+        last = sent(&mut bench).pop().unwrap_or(last);
+        assert_eq!(last, 19_999_u32.to_le_bytes(), "{kbit} kbit/s: the newest value is sent at last");
+    }
+}
+
+/// The application asks for it, without a change of a value.
+#[test]
+fn an_event_of_the_application_sends_one_of_types_254_and_255() {
+    for (transmission, is_sent) in
+        [(254, true), (255, true), (1, false), (0, false), (252, false), (253, false)]
+    {
+        let mut bench = bench(transmission, 100, 0);
+        bench.run(Duration::from_millis(20));
+        bench.take();
+        for number in [0, 2, 513, u16::MAX] {
+            let _ = bench.device.send_tpdo(number, bench.now, &mut bench.out);
+        }
+        assert_eq!(sent(&mut bench).len(), 0, "other numbers");
+        let _ = bench.device.send_tpdo(1, bench.now, &mut bench.out);
+        assert_eq!(sent(&mut bench).len(), usize::from(is_sent), "type {transmission}");
+        // The inhibit time is 10 ms.
+        let _ = bench.device.send_tpdo(1, bench.now, &mut bench.out);
+        assert_eq!(sent(&mut bench).len(), 0, "type {transmission}");
+        assert_eq!(bench.times_of(TPDO, Duration::from_millis(30)), vec![10_000; is_sent.into()]);
+        bench.nmt(0x80);
+        let _ = bench.device.send_tpdo(1, bench.now, &mut bench.out);
+        assert_eq!(bench.times_of(TPDO, Duration::from_millis(30)), [], "in Pre-operational");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use canopen::dictionary::{Access, Dictionary, Mapping, Object, Services, Sizes, Type};
 use canopen::nmt::State;
-use canopen::{Application, Condition, Device, ErrorClass, Frame, Instant, NodeId, objects};
+use canopen::{Application, Condition, Definition, Device, ErrorClass, Frame, Instant, NodeId, objects};
 
 use crate::bench::{ID, Nothing, Sent, download};
 
@@ -72,6 +72,35 @@ fn the_rows_decide_on_the_services() {
     let other = [Services::of(&[objects::start_up()]), Services::of(&[objects::program_control()[1]])];
     let expected = [Services::SELF_START, Services::PROGRAM_CONTROL].map(|own| own.with(Services::FAULTS));
     assert_eq!(other, expected);
+}
+
+/// PDOs of one direction are enough for the rules of their objects.
+#[test]
+fn pdos_of_one_direction_have_the_interlocks_of_their_objects() {
+    const RECEIVING: &[Object] = canopen::rows!(objects::rpdo(1, &[OUTPUT]), [OUTPUT]);
+    static RECEIVING_DICTIONARY: Dictionary = canopen::dictionary!(RECEIVING);
+    let (mut sending, _) = operational(Nothing);
+    let mut receiving: canopen::device!(Nothing, RECEIVING) =
+        Device::new(&RECEIVING_DICTIONARY, NodeId::new(ID), Nothing);
+    let _ = receiving.start(Instant(0), &mut Sent::default());
+    check(&mut sending, 0x1800, 0x6000_0008);
+    check(&mut receiving, 0x1400, 0x6100_0008);
+
+    fn check<D: Definition>(device: &mut Device<D>, at: u16, mapped: u32) {
+        let mut write = |index, sub, value: &[u8]| download(device, (index, sub), value, Instant(10));
+        let (off, on) = (0x8000_0201_u32.to_le_bytes(), 0x0000_0201_u32.to_le_bytes());
+        let mapped = mapped.to_le_bytes();
+        assert_eq!(write(at + 0x200, 0, &[0]), Err(0x0601_0000), "{at:04X}h is valid");
+        assert_eq!(write(at, 1, &off), Ok(()));
+        assert_eq!(write(at + 0x200, 1, &mapped), Err(0x0601_0000), "{at:04X}h maps an object");
+        assert_eq!(write(at + 0x200, 0, &[0]), Ok(()));
+        assert_eq!(write(at + 0x200, 1, &0x7000_0008_u32.to_le_bytes()), Err(0x0602_0000));
+        assert_eq!(write(at + 0x200, 1, &mapped), Ok(()));
+        assert_eq!(write(at + 0x200, 0, &[2]), Err(0x0602_0000), "{at:04X}h: the second is missing");
+        assert_eq!(write(at, 1, &on), Err(0x0609_0030), "{at:04X}h maps nothing");
+        assert_eq!(write(at + 0x200, 0, &[1]), Ok(()));
+        assert_eq!(write(at, 1, &on), Ok(()));
+    }
 }
 
 #[test]

@@ -165,6 +165,36 @@ fn a_request_before_the_boot_up_message_may_be_answered_after_it() {
     assert!(breaches_of(&again).contains("a response without a request"));
 }
 
+/// The node may answer the end of a block that a reset has interrupted, but no segment before it.
+#[test]
+fn the_rest_of_a_block_after_a_reset_is_no_request() {
+    let begin = [0xC4, 0x00, 0x2F, 0, 0, 0, 0, 0];
+    let begun = [0xA4, 0x00, 0x2F, 0, 127, 0, 0, 0];
+    let abort = [0x80, 0x00, 0x2F, 0, 0x22, 0, 0, 8];
+    let segments: Vec<[u8; 8]> = (1..=127).map(|sequence| [sequence, 1, 0x10, 0, 0, 0, 0, 0]).collect();
+    let judge = |answered: u8, answer: &[u8]| {
+        let mut frames =
+            vec![(1_000, BOOT_UP.0, BOOT_UP.1), (2_000, 0x605, &begin[..]), (3_000, 0x585, &begun[..])];
+        for (at, segment) in (10_000..).step_by(250).zip(&segments) {
+            match segment[0] {
+                30 => frames.push((at - 100, 0x000, &[0x82, 5])),
+                35 => frames.push((at - 100, BOOT_UP.0, BOOT_UP.1)),
+                _ => (),
+            }
+            frames.push((at, 0x605, segment));
+            if segment[0] == answered {
+                frames.push((at + 100, 0x585, answer));
+            }
+        }
+        frames.extend([(100_000, READ.0, READ.1), (101_000, ANSWER.0, ANSWER.1)]);
+        breaches_of(&frames)
+    };
+    assert_eq!(judge(127, &abort), "");
+    assert_eq!(judge(0, &[]), "");
+    let answer = [0x4F, 1, 0x10, 0, 0, 0, 0, 0];
+    assert!(judge(0x40, &answer).contains("a response without a request"), "{}", judge(0x40, &answer));
+}
+
 /// A bootloader answers the start of a program, and restarts later.
 #[test]
 fn a_request_to_a_node_that_restarts_itself_may_be_answered_after_its_boot_up_message() {

@@ -46,6 +46,12 @@ struct State<S> {
 /// A simulated bus. Clones share the bus.
 pub(crate) struct Wire<S>(Rc<RefCell<State<S>>>);
 
+impl<S> Clone for Wire<S> {
+    fn clone(&self) -> Wire<S> {
+        Wire(Rc::clone(&self.0))
+    }
+}
+
 impl<S: Station + 'static> Wire<S> {
     pub(crate) fn new(station: S) -> Wire<S> {
         let fault = Box::new(|_: &Frame| Fate::Arrives);
@@ -73,10 +79,10 @@ impl<S: Station + 'static> Wire<S> {
 
     /// A client's connection to the bus. Opening it again repairs the connection.
     pub(crate) fn network(&self) -> Network {
-        let this = Wire(Rc::clone(&self.0));
+        let this = self.clone();
         Network::open(move || {
             this.0.borrow_mut().broken = false;
-            Ok(Box::new(Wire(Rc::clone(&this.0))))
+            Ok(Box::new(this.clone()))
         })
         .expect("an open bus")
     }

@@ -58,6 +58,13 @@ impl Verdict {
             _ => None,
         }
     }
+
+    pub(in crate::check) const fn deviation_mut(&mut self) -> Option<&mut Deviation> {
+        match self {
+            Verdict::Failed(deviation) | Verdict::Recommended(deviation) => Some(deviation),
+            _ => None,
+        }
+    }
 }
 
 impl From<BusError> for Stop {

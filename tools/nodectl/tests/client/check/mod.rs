@@ -6,8 +6,10 @@ mod faulty;
 mod layers;
 mod own;
 mod reference;
+mod stalls;
 mod switches;
 
+use nodectl::Network;
 use nodectl::bus::Station;
 use nodectl::check::{self, Effect, Profile, Run, Setup, Subject, Verdict};
 
@@ -20,7 +22,16 @@ fn judge<S: Station + 'static>(
     profile: Option<Profile>,
     only: &[&str],
 ) -> Run {
-    let mut network = wire.network();
+    judge_over(&mut wire.network(), sheet, profile, only)
+}
+
+/// Runs checks on the device with node-ID 5 of a network.
+fn judge_over(
+    network: &mut Network,
+    sheet: Option<eds::Eds>,
+    profile: Option<Profile>,
+    only: &[&str],
+) -> Run {
     let setup = Setup {
         node: canopen::NodeId::new(5).expect("a node-ID"),
         sheet,
@@ -30,7 +41,7 @@ fn judge<S: Station + 'static>(
     let mut checks = check::all(profile);
     checks.retain(|check| only.is_empty() || only.iter().any(|text| check.is_meant(text)));
     let options = check::Options { checks, allowed: Effect::Stores };
-    let mut subject = Subject::new(&mut network, setup);
+    let mut subject = Subject::new(network, setup);
     match check::run(&mut subject, &options, |_| ()) {
         Ok(run) => run,
         Err(stop) => panic!("{stop:?}"),
