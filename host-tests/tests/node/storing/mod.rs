@@ -5,6 +5,7 @@
 
 mod board;
 mod chip;
+mod waiting;
 
 use board::{Board, DEVICE_STATE, Object};
 use canopen::Duration;
