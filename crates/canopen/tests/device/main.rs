@@ -35,5 +35,6 @@ mod store;
 mod store_at_once;
 mod sync;
 mod tpdo;
+mod two_dictionaries;
 mod types;
 mod wrong_tables;

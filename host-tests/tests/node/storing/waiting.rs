@@ -20,7 +20,11 @@ fn a_save_that_waits_for_samples_makes_the_services_due_with_the_last_of_them() 
         for sample in 1..=OLDER_SAMPLES {
             assert!(!bench.protocol.take_job(&mut job), "{personality:?}: the job waits at sample {sample}");
             let next = bench.protocol.publish(bench.now, &mut bench.out);
-            assert_eq!(next.services == bench.now, sample == OLDER_SAMPLES, "{personality:?}: sample {sample}");
+            assert_eq!(
+                next.services == bench.now,
+                sample == OLDER_SAMPLES,
+                "{personality:?}: sample {sample}"
+            );
         }
         assert!(bench.protocol.take_job(&mut job), "{personality:?}: the job no longer waits");
         let next = bench.protocol.publish(bench.now, &mut bench.out);

@@ -1,0 +1,43 @@
+//! One device type for two dictionaries, of which one has no EMCY (1014h) and no heartbeat.
+
+use canopen::dictionary::{Dictionary, Object, Sizes};
+use canopen::{Application, Condition, Device, Instant, NodeId, objects};
+
+use crate::types::Sent;
+
+const ID: u8 = 5;
+const FULL: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register(), objects::heartbeat_producer(1000)],
+    objects::emergency(),
+    objects::identity(0, 1, 1),
+);
+const BARE: &[Object] =
+    canopen::rows!([objects::device_type(0), objects::error_register()], objects::identity(0, 1, 1));
+static DICTIONARIES: [Dictionary; 2] = [canopen::dictionary!(FULL), canopen::dictionary!(BARE)];
+
+#[derive(Default)]
+struct OneCondition;
+
+impl Application for OneCondition {
+    const CONDITIONS: &'static [Condition] = &[Condition::new(0x5000)];
+}
+
+type Node = canopen::device!(OneCondition, room: Sizes::of(FULL));
+
+/// The CAN-IDs of the frames that a node sends in 3 s, with a condition that becomes active.
+fn ids(dictionary: &'static Dictionary) -> Vec<u16> {
+    let mut sent = Sent::default();
+    let mut node: Node = Device::new(dictionary, NodeId::new(ID), OneCondition);
+    let mut next = node.start(Instant(0), &mut sent);
+    let _ = node.set_condition(0, true, Instant(10));
+    while next.due() < Instant(3_000_000) {
+        next = node.poll(next.due().max(Instant(20)), &mut sent);
+    }
+    sent.0.iter().map(canopen::Frame::id).collect()
+}
+
+#[test]
+fn a_dictionary_without_emcy_and_heartbeat_sends_none_in_a_device_with_room_for_them() {
+    assert_eq!(ids(&DICTIONARIES[0]), [0x705, 0x085, 0x705, 0x705]);
+    assert_eq!(ids(&DICTIONARIES[1]), [0x705]);
+}
