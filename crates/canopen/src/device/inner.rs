@@ -237,7 +237,7 @@ impl<D: Definition> Inner<D> {
             self.configure_time();
         }
         if Self::has(Services::EMCY) {
-            let _ = self.emcy.configure(self.number_or(0x1014, 0, emcy::OFF));
+            let _ = self.emcy.configure(self.number_or(0x1014, 0, u32::MAX));
             self.emcy.set_inhibit(low_half(self.number(0x1015, 0)), now);
             let errors = (1..=emcy::HISTORY).take_while(|&sub| self.dictionary.find(0x1003, sub).is_ok());
             self.emcy.set_history_depth(errors.last().unwrap_or(0));

@@ -9,4 +9,4 @@ use fault::FaultSet;
 pub use fault::{Condition, ErrorClass, Fault};
 pub(crate) use history::DEPTH as HISTORY;
 pub use message::Message;
-pub(crate) use producer::{OFF, Producer};
+pub(crate) use producer::Producer;

@@ -9,9 +9,6 @@ use crate::{CobId, Frame, Span, Tick, Transmit};
 /// one.
 const WAITING: usize = 8;
 
-/// The COB-ID (1014h) of a device without EMCY: bit 31 is set.
-pub(crate) const OFF: u32 = 1 << 31;
-
 /// The error field of a fault of the application; `None` for the one of its condition.
 pub(crate) type Detail = Option<[u8; 5]>;
 
