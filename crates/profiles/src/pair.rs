@@ -175,38 +175,55 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
 mod tests {
     use super::*;
 
-    struct Nothing;
+    struct Sensor;
 
-    impl Chain for Nothing {
-        type Parameters = ();
-        type Snapshot = ();
+    impl Chain for Sensor {
+        type Parameters = PositionInputs;
+        type Snapshot = u32;
 
-        fn new(_: &PowerOn) -> Nothing {
-            Nothing
+        fn new(_: &PowerOn) -> Sensor {
+            Sensor
         }
 
-        fn apply(&mut self, (): &()) {}
+        fn apply(&mut self, _: &PositionInputs) {}
 
-        fn update(&mut self, _: &Inputs, (): &mut ()) {}
+        fn update(&mut self, _: &Inputs, count: &mut u32) {
+            *count += 1;
+        }
+
+        fn position_inputs(parameters: &PositionInputs) -> PositionInputs {
+            *parameters
+        }
     }
 
-    /// A profile that stores its calls at its own place in the image.
+    /// A profile at its own place in the image. Its TPDO, its handled object and its output have the number of the place;
+    /// it stores its calls at the place.
     struct Witness(usize);
 
+    impl Witness {
+        fn is_mine(&self, number: u16) -> bool {
+            usize::from(number) == self.0
+        }
+    }
+
     impl Profile for Witness {
-        type Chain = Nothing;
+        type Chain = Sensor;
         type Fields = usize;
 
         fn new(place: &'static usize) -> Witness {
             Witness(*place)
         }
 
-        fn parameters(&self, _: &[u8]) {}
+        fn parameters(&self, image: &[u8]) -> PositionInputs {
+            PositionInputs { are_used: true, ssi_bits: Some(image[self.0].into()) }
+        }
 
-        fn publish(&mut self, (): &(), _: &mut [u8]) {}
+        fn publish(&mut self, count: &u32, image: &mut [u8]) {
+            image[self.0] = count.to_le_bytes()[0];
+        }
 
-        fn handles(&self, _: u16, _: u8) -> bool {
-            false
+        fn handles(&self, index: u16, _: u8) -> bool {
+            self.is_mine(index)
         }
 
         fn write(&mut self, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
@@ -220,16 +237,88 @@ mod tests {
         fn error(&mut self, class: ErrorClass, image: &mut [u8]) {
             image[self.0] = class.0;
         }
+
+        fn sends_events(&self, tpdo: u16) -> bool {
+            self.is_mine(tpdo)
+        }
+
+        fn begin_events(&mut self, _: u16, image: &mut [u8]) {
+            image[self.0] = 100;
+        }
+
+        fn next_event(&mut self, _: u16, image: &mut [u8]) -> bool {
+            image[self.0] = image[self.0].saturating_sub(60);
+            image[self.0] > 0
+        }
+
+        fn is_quiet(&self, place: usize) -> bool {
+            place == self.0
+        }
+
+        fn outputs(&self, image: &[u8]) -> Outputs {
+            let mut outputs = Outputs::default();
+            outputs.digital[self.0] = image[self.0] > 0;
+            outputs
+        }
+    }
+
+    type Two = Pair<Witness, Witness>;
+
+    fn two() -> (Two, [u8; 2]) {
+        (Two::new(&(0, 1)), [0; 2])
     }
 
     #[test]
     fn both_profiles_receive_syncs_and_errors() {
-        let (mut pair, mut image) = (Pair::<Witness, Witness>::new(&(0, 1)), [0; 2]);
+        let (mut pair, mut image) = two();
         pair.synchronised(Some(7), &mut image);
         assert_eq!(image, [7, 7]);
         pair.synchronised(None, &mut image);
         assert_eq!(image, [0xFF, 0xFF]);
         pair.error(ErrorClass::DEVICE, &mut image);
         assert_eq!(image, [2, 2]);
+    }
+
+    #[test]
+    fn the_events_of_a_tpdo_are_those_of_the_profile_that_sends_them() {
+        for tpdo in [0, 1] {
+            let (mut pair, mut image) = two();
+            let expect = |value: u8| if tpdo == 0 { [value, 0] } else { [0, value] };
+            assert!(pair.sends_events(tpdo));
+            pair.begin_events(tpdo, &mut image);
+            assert_eq!(image, expect(100));
+            assert!(pair.next_event(tpdo, &mut image));
+            assert_eq!(image, expect(40));
+            assert!(!pair.next_event(tpdo, &mut image));
+            assert_eq!(image, expect(0));
+        }
+        assert!(!two().0.sends_events(2));
+    }
+
+    #[test]
+    fn an_object_and_a_threshold_belong_to_either_profile() {
+        let (pair, _) = two();
+        assert_eq!([0, 1, 2].map(|index| pair.handles(index, 0)), [true, true, false]);
+        assert_eq!([0, 1, 2].map(|place| pair.is_quiet(place)), [true, true, false]);
+    }
+
+    #[test]
+    fn a_digital_output_is_on_when_either_profile_switches_it_on() {
+        let (pair, _) = two();
+        for digital in [[false, false], [true, false], [false, true], [true, true]] {
+            assert_eq!(pair.outputs(&digital.map(u8::from)), Outputs { digital });
+        }
+    }
+
+    #[test]
+    fn the_position_inputs_serve_the_first_profile_that_uses_them() {
+        let unused = PositionInputs::default();
+        let incremental = PositionInputs { are_used: true, ..unused };
+        let ssi = |bits| PositionInputs { ssi_bits: Some(bits), ..incremental };
+        let of = |first, second| ChainPair::<Sensor, Sensor>::position_inputs(&(first, second));
+        assert_eq!(of(unused, unused), unused);
+        assert_eq!(of(incremental, unused), incremental);
+        assert_eq!(of(unused, ssi(12)), ssi(12));
+        assert_eq!(of(ssi(24), ssi(12)), ssi(24));
     }
 }
