@@ -1,11 +1,12 @@
 //! The personality of a node: object 2000h, stored at once and in force after the next reset.
 
-use canopen::Instant;
 use canopen::lss::Request as LssRequest;
 use canopen::sdo::Abort;
+use canopen::{Duration, Frame, Instant};
 use host_tests::bench::{Bench, ID};
 use node::{Action, Personality, StoreJob};
 
+const RESET_COMMUNICATION: u8 = 0x82;
 const VALUE_TOO_HIGH: u32 = 0x0609_0031;
 
 fn device_type(bench: &mut Bench) -> u32 {
@@ -98,14 +99,56 @@ fn a_failed_store_is_reported_and_changes_nothing() {
     assert_eq!(personality(&mut bench), 0);
 }
 
+const NO_DATA: u32 = 0x0800_0024;
+
 #[test]
 fn the_transfer_buffer_of_every_personality_returns_the_data_of_a_download() {
-    const NO_DATA: u32 = 0x0800_0024;
     let data: Vec<u8> = (0..100).collect();
     for personality in Personality::ALL {
         let mut bench = Bench::booted_as(personality);
         assert_eq!(bench.read(0x2F00, 0), Err(NO_DATA), "{personality:?}");
         bench.write(0x2F00, 0, &data).unwrap();
         assert_eq!(bench.read(0x2F00, 0), Ok(data.clone()), "{personality:?}");
+    }
+}
+
+#[test]
+fn a_download_that_ends_halfway_leaves_the_transfer_buffer_empty() {
+    let data: Vec<u8> = (0..100).collect();
+    let begin = [0x21, 0x00, 0x2F, 0, 100, 0, 0, 0];
+    let segment = [0x00, 1, 2, 3, 4, 5, 6, 7];
+    let begin_of_a_block = [0xC2, 0x00, 0x2F, 0, 100, 0, 0, 0];
+    let segment_of_a_block = [0x01, 1, 2, 3, 4, 5, 6, 7];
+    let abort = [0x80, 0x00, 0x2F, 0, 0, 0, 0x04, 0x05];
+    for personality in Personality::ALL {
+        for (begin, segment) in [(begin, segment), (begin_of_a_block, segment_of_a_block)] {
+            for end in ["abort", "reset of the communication", "a new download"] {
+                let case = format!("{personality:?}, {:02X}h, {end}", begin[0]);
+                let mut bench = Bench::booted_as(personality);
+                bench.write(0x2F00, 0, &data).unwrap();
+                let request = |bench: &mut Bench, bytes: [u8; 8]| {
+                    bench.receive(&Frame::new(0x600 + bench.id(), &bytes).unwrap());
+                };
+                request(&mut bench, begin);
+                request(&mut bench, segment);
+                match end {
+                    "abort" => request(&mut bench, abort),
+                    "a new download" => request(&mut bench, begin),
+                    _ => {
+                        bench.nmt(RESET_COMMUNICATION);
+                        bench.restart();
+                    }
+                }
+                if end == "a new download" {
+                    request(&mut bench, abort);
+                }
+                bench.now = bench.now + Duration::from_millis(200);
+                bench.poll();
+                bench.take();
+                assert_eq!(bench.read(0x2F00, 0), Err(NO_DATA), "{case}");
+                bench.write(0x2F00, 0, &data).unwrap();
+                assert_eq!(bench.read(0x2F00, 0), Ok(data.clone()), "{case}");
+            }
+        }
     }
 }
