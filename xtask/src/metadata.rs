@@ -5,6 +5,9 @@ use std::process::Command;
 
 use serde::Deserialize;
 
+/// The features of the released programs.
+const RELEASED: &str = "nodectl/arrow";
+
 /// The packages, and which of them depend on which.
 #[derive(Deserialize)]
 pub(crate) struct Metadata {
@@ -67,6 +70,7 @@ impl Metadata {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
         command.args(["metadata", "--format-version", "1", "--locked", "--filter-platform", platform]);
+        command.args(["--features", RELEASED]);
         command.current_dir(env!("CARGO_MANIFEST_DIR"));
         let output = command.output().map_err(|error| error.to_string())?;
         if !output.status.success() {

@@ -102,7 +102,7 @@ fn steps(flags: &Flags, folder: &Path) -> Vec<Command> {
     let mut bill = xtask(&["sbom", "--out"]);
     bill.arg(folder);
     let mut nodectl = cargo();
-    nodectl.args(["build", "--release", "--locked", "-p", "nodectl"]);
+    nodectl.args(["build", "--release", "--locked", "-p", "nodectl", "--features", "arrow"]);
     let mut library = cargo();
     library.args(["package", "--locked", "-p", "canopen-device"]);
     vec![xtask(&["test"]), xtask(&["reproducible"]), xtask(&["images"]), sign, bill, nodectl, library]

@@ -18,7 +18,7 @@ pub(super) const IMAGES: [&str; 5] =
 /// A cargo call for all packages of this machine, including the emulated board.
 pub(super) fn cargo(verb: &str) -> Result<Command> {
     let mut command = emulator::cargo_with_emulator()?;
-    command.args([verb, "--workspace", "--profile", "sim", "--features", "host-tests/board"]);
+    command.args([verb, "--workspace", "--profile", "sim", "--features", "host-tests/board,nodectl/arrow"]);
     for package in IMAGES {
         command.args(["--exclude", package]);
     }

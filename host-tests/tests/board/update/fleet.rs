@@ -87,6 +87,20 @@ pub(super) fn try_update(
     mut outage: Option<Outage>,
     more: &[&str],
 ) -> Result<Vec<Value>, String> {
+    let happens = move |world: &mut World| {
+        outage.take_if(|outage| outage.is_over(world));
+    };
+    update_while(world, nodes, image, happens, more)
+}
+
+/// Runs the command while something happens: `happens` is called again and again, as time passes.
+pub(super) fn update_while(
+    world: &Shared,
+    nodes: &str,
+    image: &Image,
+    happens: impl FnMut(&mut World) + 'static,
+    more: &[&str],
+) -> Result<Vec<Value>, String> {
     // Tests may run at the same time in one process.
     static FILES: AtomicU32 = AtomicU32::new(0);
     let name = format!("{}-{}.img", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
@@ -94,9 +108,7 @@ pub(super) fn try_update(
     std::fs::write(&file, image.to_bytes()).unwrap();
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
     let cli = Cli::try_parse_from(line.iter().chain(more).copied().chain(file.to_str())).unwrap();
-    let (printed, result) = run(world, &cli, move |world| {
-        outage.take_if(|outage| outage.is_over(world));
-    });
+    let (printed, result) = run(world, &cli, happens);
     std::fs::remove_file(file).unwrap();
     result.map_err(|failure| format!("{failure}: {printed}"))?;
     println!("{:6.2} s: {printed}", world.borrow().now().as_secs_f64());

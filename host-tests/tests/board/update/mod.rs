@@ -2,6 +2,7 @@
 
 mod authorisation;
 mod bench;
+mod broken_line;
 mod corrupted;
 mod cuts;
 mod device;

@@ -62,6 +62,13 @@ impl Error {
     pub fn is_silence(&self) -> bool {
         matches!(self.cause, Cause::Transfer(sdo::Error::NoAnswer) | Cause::Bus(BusError::Lost(_)))
     }
+
+    /// Whether the remains of an earlier transfer have disturbed this one: the answer is one of another protocol.
+    #[must_use]
+    pub fn is_disturbed(&self) -> bool {
+        let is_unexpected = matches!(self.cause, Cause::Transfer(sdo::Error::Unexpected));
+        is_unexpected || self.abort().is_some_and(AbortCode::is_protocol)
+    }
 }
 
 /// `node 5, 1017h:0 "Producer heartbeat time": 0609 0030h, invalid value for the parameter`

@@ -71,7 +71,7 @@ struct State {
 enum Progress {
     /// The node is unchanged.
     Untouched,
-    /// The old program is erased.
+    /// The old program is erased: a program that is there afterwards is the new one.
     Cleared,
     /// The new program is downloaded and valid.
     Complete,
@@ -212,12 +212,18 @@ impl<'a> Job<'a> {
             self.program(network).restart(Command::Stop)?;
             self.wait_until_running(network, false, "stop its program")?;
         }
-        self.progress = Progress::Cleared;
-        self.clear(network, watcher)?;
-        self.download(network, watcher)?;
-        watcher.step(self.node, Step::Verify);
-        self.wait_for_flash(network, is_good)?;
-        self.compare(network)?;
+        match self.clear(network, watcher) {
+            // The download was complete when the node was lost, so the program on trial is the new one.
+            Err(Error::OnTrial { .. }) if self.progress == Progress::Cleared => {}
+            result => {
+                result?;
+                self.progress = Progress::Cleared;
+                self.download(network, watcher)?;
+                watcher.step(self.node, Step::Verify);
+                self.wait_for_flash(network, is_good)?;
+                self.compare(network)?;
+            }
+        }
         self.progress = Progress::Complete;
         Ok(())
     }
@@ -327,7 +333,8 @@ impl<'a> Job<'a> {
             match self.program(network).is_running() {
                 Ok(_) => return Ok(()),
                 Err(sdo::Error { cause: sdo::Cause::Bus(BusError::Lost(_)), .. }) => reopen(network),
-                Err(error) if error.is_silence() => network.pause(POLL)?,
+                // After bus-off, node and adapter send the frames of the broken transfer that they have kept.
+                Err(error) if error.is_silence() || error.is_disturbed() => network.pause(POLL)?,
                 Err(error) => return Err(error.into()),
             }
             if network.now() >= until {
@@ -357,15 +364,15 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Whether the node has the new program. A forced update has to download first, even if the node has the program
-    /// already. If a loader does not tell its program (1F56h reads 0), the download is trusted.
+    /// Whether the node has the new program. A forced update has to clear and download first, even if the node has the
+    /// program already. If a loader does not tell its program (1F56h reads 0), the download is trusted.
     fn is_there(&self, now: &State) -> bool {
         let is_complete = self.progress == Progress::Complete;
         match &self.image.info {
             Some(info) => {
                 let is_it = now.is_valid
                     && now.identification.map_or(is_complete, |found| found == info.identification);
-                is_it && (is_complete || !self.options.force)
+                is_it && (self.progress != Progress::Untouched || !self.options.force)
             }
             None => is_complete,
         }

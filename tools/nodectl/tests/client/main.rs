@@ -1,5 +1,7 @@
 //! Tests of the library with nodes in this process, in virtual time.
 
+#[cfg(feature = "arrow")]
+mod arrow;
 mod bad_input;
 mod blocks;
 mod check;

@@ -1,5 +1,6 @@
 //! `nodectl record`
 
+#[cfg(feature = "arrow")]
 mod arrow;
 mod plot;
 mod rows;
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use canopen::{Duration, Instant};
 use clap::Args;
 
+#[cfg(feature = "arrow")]
 use self::arrow::Arrow;
 use self::plot::Plot;
 pub(super) use self::plot::range;
@@ -47,7 +49,8 @@ pub(super) struct Record {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
-    /// The same table as a stream of Apache Arrow ("-" for the standard output), for recordings of days.
+    /// The same table as a stream of Apache Arrow ("-" for the standard output), for recordings of days. Needs a nodectl
+    /// that is built with `--features arrow`.
     #[arg(long, value_name = "FILE")]
     arrow: Option<PathBuf>,
 
@@ -67,6 +70,11 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 impl Record {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        if self.arrow.is_some() && !cfg!(feature = "arrow") {
+            let advice =
+                "this nodectl is built without Apache Arrow: cargo build -p nodectl --features arrow";
+            return Err(Failure::Usage(advice.to_owned()));
+        }
         // Open all files before the recording, so that a file that cannot be written is reported at once.
         let files = [&self.csv, &self.arrow, &self.svg];
         let [csv, arrow, svg] = files.map(|path| path.as_deref().map(Target::open).transpose());
@@ -118,6 +126,7 @@ fn sinks(
     if let Some(target) = csv {
         sinks.push(Box::new(Table::new(target, signals)?));
     }
+    #[cfg(feature = "arrow")]
     if let Some(file) = arrow {
         sinks.push(Box::new(Arrow::new(file, signals)?));
     }

@@ -1,0 +1,62 @@
+//! An update over a line that destroys every frame for a while: the node becomes bus-off in the middle of a command.
+
+use canbus::Time;
+use fastrand::Rng;
+use host_tests::thorough::either;
+use host_tests::watch::expects;
+use monitor::Rule;
+use sim::world::World;
+
+use super::bench::{version_a, version_b};
+use super::fleet::{PERSONALITIES, Shared, share, update_while};
+use crate::support::world;
+
+/// Longer than the period of the heartbeat, so that each node has something to send in it.
+const NOISE: Time = Time::from_millis(1500);
+/// The latest beginning of the noise after that of the update, in milliseconds: the copy and the trial at any bit rate, and the
+/// download.
+fn latest(kbit: u64) -> u64 {
+    5000 + 2_200_000 / kbit
+}
+
+/// The line is broken from this instant on for [`NOISE`].
+fn noise(begin: Time) -> impl FnMut(&mut World) {
+    let mut is_on = false;
+    move |world| {
+        let is_wanted = (begin..begin + NOISE).contains(&world.now());
+        if is_wanted && !is_on {
+            world.bus().faults.noise(1, 1.0);
+        } else if is_on && !is_wanted {
+            world.bus().faults.quiet();
+        }
+        is_on = is_wanted;
+    }
+}
+
+#[test]
+fn nodectl_completes_an_update_over_a_line_that_breaks_at_any_time() {
+    let _expected = expects([Rule::HeartbeatLate]);
+    let mut rng = Rng::with_seed(5);
+    // The fifth case begins between the last segment and the answer that the program is valid.
+    for case in 0..either(5, 48) {
+        let (personality, node) = (PERSONALITIES[case % 4], [1, 16, 127][case % 3]);
+        let kbit = [1000, 500, 250, 125][case % 4];
+        let world: Shared = share(world(&format!("--bitrate {kbit} --node {node}:{personality}")));
+        let begin = world.borrow().now() + Time::from_millis(rng.u64(..latest(kbit)));
+        let image = version_b(0);
+        let result = update_while(&world, &node.to_string(), &image, noise(begin), &[]);
+        let told = format!("{personality} at {node}, {kbit} kbit/s, noise from {:.3} s", begin.as_secs_f64());
+        let reports = result.unwrap_or_else(|error| panic!("{told}: {error}"));
+        println!("{told}: {:.1} s", world.borrow().now().as_secs_f64());
+        assert!(world.borrow().now() > begin, "{told}: the update was over before");
+        assert_eq!(reports[0]["result"], "updated", "{told}: {reports:?}");
+        assert_eq!(reports[0]["new_identification"], image.header.code_crc(), "{told}");
+        assert_eq!(reports[0]["old_identification"], version_a().header.code_crc(), "{told}");
+        let summary = world.borrow().summary(1.0, 0);
+        // The node resets itself for the update, and for nothing else.
+        let is_clean =
+            summary.nodes[0].incidents.iter().all(|incident| incident.ends_with("reset by software"));
+        assert!(is_clean, "{told}: {summary}");
+        assert!(summary.bus.errors > 0, "{told}: {summary}");
+    }
+}
