@@ -6,7 +6,7 @@ use std::process::Command;
 use serde::Deserialize;
 
 /// The features of the released programs.
-const RELEASED: &str = "nodectl/arrow";
+pub(crate) const RELEASED: &str = "nodectl/arrow";
 
 /// The packages, and which of them depend on which.
 #[derive(Deserialize)]

@@ -13,6 +13,7 @@ use start::output;
 
 use crate::command::{cargo, line, root, run, target_dir};
 use crate::images;
+use crate::metadata::RELEASED;
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -102,7 +103,7 @@ fn steps(flags: &Flags, folder: &Path) -> Vec<Command> {
     let mut bill = xtask(&["sbom", "--out"]);
     bill.arg(folder);
     let mut nodectl = cargo();
-    nodectl.args(["build", "--release", "--locked", "-p", "nodectl", "--features", "arrow"]);
+    nodectl.args(["build", "--release", "--locked", "-p", "nodectl", "--features", RELEASED]);
     let mut library = cargo();
     library.args(["package", "--locked", "-p", "canopen-device"]);
     vec![xtask(&["test"]), xtask(&["reproducible"]), xtask(&["images"]), sign, bill, nodectl, library]

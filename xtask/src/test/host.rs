@@ -9,6 +9,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 
+use crate::metadata::RELEASED;
 use crate::setup::emulator;
 
 /// The packages that build for the embedded target only.
@@ -18,7 +19,16 @@ pub(super) const IMAGES: [&str; 5] =
 /// A cargo call for all packages of this machine, including the emulated board.
 pub(super) fn cargo(verb: &str) -> Result<Command> {
     let mut command = emulator::cargo_with_emulator()?;
-    command.args([verb, "--workspace", "--profile", "sim", "--features", "host-tests/board,nodectl/arrow"]);
+    command.args([
+        verb,
+        "--workspace",
+        "--profile",
+        "sim",
+        "--features",
+        "host-tests/board",
+        "--features",
+        RELEASED,
+    ]);
     for package in IMAGES {
         command.args(["--exclude", package]);
     }

@@ -15,7 +15,6 @@ const BARE: &[Object] =
     canopen::rows!([objects::device_type(0), objects::error_register()], objects::identity(0, 1, 1));
 static DICTIONARIES: [Dictionary; 2] = [canopen::dictionary!(FULL), canopen::dictionary!(BARE)];
 
-#[derive(Default)]
 struct OneCondition;
 
 impl Application for OneCondition {

@@ -63,7 +63,7 @@ impl Error {
         matches!(self.cause, Cause::Transfer(sdo::Error::NoAnswer) | Cause::Bus(BusError::Lost(_)))
     }
 
-    /// Whether the remains of an earlier transfer have disturbed this one: the answer is one of another protocol.
+    /// Whether the answer fits another transfer, as when the frames of an earlier one are still on their way.
     #[must_use]
     pub fn is_disturbed(&self) -> bool {
         let is_unexpected = matches!(self.cause, Cause::Transfer(sdo::Error::Unexpected));

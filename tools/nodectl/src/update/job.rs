@@ -212,20 +212,24 @@ impl<'a> Job<'a> {
             self.program(network).restart(Command::Stop)?;
             self.wait_until_running(network, false, "stop its program")?;
         }
-        match self.clear(network, watcher) {
-            // The download was complete when the node was lost, so the program on trial is the new one.
-            Err(Error::OnTrial { .. }) if self.progress == Progress::Cleared => {}
-            result => {
-                result?;
-                self.progress = Progress::Cleared;
-                self.download(network, watcher)?;
-                watcher.step(self.node, Step::Verify);
-                self.wait_for_flash(network, is_good)?;
-                self.compare(network)?;
-            }
+        let cleared = self.clear(network, watcher);
+        // The download was complete when the node was lost, so the program on trial is the new one.
+        let is_complete = self.progress == Progress::Cleared && matches!(cleared, Err(Error::OnTrial { .. }));
+        if !is_complete {
+            cleared?;
+            self.progress = Progress::Cleared;
+            self.fill(network, watcher)?;
         }
         self.progress = Progress::Complete;
         Ok(())
+    }
+
+    /// Downloads the new program into the cleared flash, and waits until the node has checked it.
+    fn fill(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+        self.download(network, watcher)?;
+        watcher.step(self.node, Step::Verify);
+        self.wait_for_flash(network, is_good)?;
+        self.compare(network)
     }
 
     fn compare(&self, network: &mut Network) -> Result<(), Error> {
