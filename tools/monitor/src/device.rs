@@ -43,6 +43,8 @@ pub(crate) struct Device {
     early: Vec<(u8, [u8; 8])>,
     /// A value may be to be confirmed.
     is_wishful: bool,
+    /// The node changes its bit rate, and is silent until then. It may have left this bus.
+    retunes_until: Option<Instant>,
 }
 
 impl Device {
@@ -61,6 +63,7 @@ impl Device {
             channel: Channel::new(),
             early: Vec::new(),
             is_wishful: false,
+            retunes_until: None,
         }
     }
 
@@ -113,10 +116,12 @@ impl Device {
         self.boot.may_restart();
     }
 
-    /// The bit rate changes: the node is silent for some time.
-    pub(crate) fn retunes(&mut self) {
+    /// The bit rate changes: the node is silent until then, and nothing is expected of it until it is heard again.
+    pub(crate) fn retunes(&mut self, until: Instant) {
         self.boot.may_restart();
         self.heartbeat.pause();
+        self.channel.give_up();
+        self.retunes_until = Some(until);
     }
 
     /// A fault is injected: everything may happen until the node boots again.
@@ -166,7 +171,7 @@ impl Device {
         }
         let inhibit = self.emcy_inhibit();
         self.errors.advance(inhibit, now, findings);
-        let Some(id) = self.id else { return };
+        let Some(id) = self.id.filter(|_| self.retunes_until.is_none()) else { return };
         let period = Duration::from_millis(self.values.sure_number(0x1017, 0).unwrap_or(0).into());
         if let Some((from, to)) = self.heartbeat.overdue(period, now)
             && (!bus.is_real() || bus.has_room(own, 0x700 + u16::from(id), from, to))
@@ -196,7 +201,7 @@ impl Device {
     /// The SDO request of a client to the node with this node-ID. Before a boot-up message, the node may miss it, or
     /// answer after the message.
     pub(crate) fn request(&mut self, node: u8, data: &[u8], now: Instant) {
-        if self.id.is_some_and(|id| id != node) {
+        if self.id.is_some_and(|id| id != node) || self.retunes_until.is_some() {
             return;
         }
         let is_running = self.id.is_some() && !self.boot.is_waiting();
@@ -264,6 +269,8 @@ impl Device {
     /// A frame of the node.
     pub(crate) fn frame(&mut self, frame: &Frame, times: Times, findings: &mut Findings) {
         let (id, at) = (frame.id(), times.at);
+        // A frame from before the change may have been in a mailbox.
+        self.retunes_until.take_if(|until| at > *until);
         let node = self.id.map(u16::from);
         let is_boot_up = node.is_some_and(|node| id == 0x700 + node) && frame.data() == [0];
         if is_boot_up {

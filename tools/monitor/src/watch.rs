@@ -339,8 +339,11 @@ impl Monitor {
                         .for_each(|device| device.command(command, at));
                 }
             }
-            LSS_REQUEST if data.first() == Some(&ACTIVATE_BIT_TIMING) => {
-                self.devices.iter_mut().for_each(Device::retunes);
+            LSS_REQUEST if data.len() == 8 && data[0] == ACTIVATE_BIT_TIMING => {
+                // The delay passes before and after the change.
+                let delay = Duration::from_millis(u16::from_le_bytes([data[1], data[2]]).into());
+                let until = at + delay + delay;
+                self.devices.iter_mut().for_each(|device| device.retunes(until));
             }
             LSS_REQUEST => self.devices.iter_mut().for_each(Device::lss),
             0x601..=0x67F if !frame.is_remote() => {

@@ -205,6 +205,13 @@ fn protocol() -> Vec<Seeded> {
             trace.remove(1_000_000..1_900_000, 0x605);
             trace.remove(1_000_000..1_900_000, RESPONSE);
         }),
+        shown("a node keeps its bit rate and leaves a request without an answer", Rule::SdoSilent, |trace| {
+            trace.activate_bit_timing(1_800_000, 100);
+            for at in (1850..=3350).step_by(100) {
+                trace.node(at * 1000 + 250, 0, 0x705, &[127]);
+            }
+            trace.at(2_060_000).ask(&[0x40, 0x03, 0x60, 0, 0, 0, 0, 0], &[]);
+        }),
         shown("the answer names another object", Rule::SdoProtocol, |trace| {
             set(trace, RESPONSE, 0x4B, 1, 0x18);
         }),

@@ -63,6 +63,22 @@ fn a_request_after_a_pause_is_no_segment() {
     assert_eq!(text(&judged(&trace)), "");
 }
 
+/// The nodes change their bit rate: those that follow are gone from this bus, and a request to them has no answer.
+#[test]
+fn a_request_while_the_bit_rate_changes_needs_no_answer() {
+    for (request, last) in [(1_799_000, None), (1_801_000, None), (1_801_000, Some(1_810_250)), (2_300_000, None)] {
+        let mut trace = Trace::clean();
+        trace.activate_bit_timing(1_800_000, 100);
+        trace.at(request).ask(&[0x40, 0x03, 0x60, 0, 0, 0, 0, 0], &[]);
+        if let Some(at) = last {
+            // It was in a mailbox.
+            trace.node(at, 0, 0x705, &[127]);
+        }
+        trace.client(3_400_000, 0x080, &[]);
+        assert_eq!(text(&judged(&trace)), "", "request at {request} us, last frame {last:?}");
+    }
+}
+
 #[test]
 fn every_seeded_breach_is_noticed_by_name() {
     let all = breaches::all();

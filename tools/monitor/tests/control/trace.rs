@@ -237,6 +237,16 @@ impl Trace {
         self.events.push(Event::Frame(Instant(at), sender, Frame::new(id, data).expect("a frame")));
     }
 
+    /// The LSS master lets all nodes use their new bit rate, and ends the frames of the nodes.
+    pub(crate) fn activate_bit_timing(&mut self, at: u64, delay: u16) {
+        let [low, high] = delay.to_le_bytes();
+        self.client(at, 0x7E5, &[21, low, high, 0, 0, 0, 0, 0]);
+        self.events.retain(|event| {
+            let is_of_node = matches!(event, Event::Frame(_, Sender::Node(_), _));
+            !is_of_node || event.at().0 <= at
+        });
+    }
+
     /// A request of the client and the answer of node 5, one frame later each; an empty answer means no answer.
     pub(crate) fn ask(&mut self, request: &[u8], answer: &[u8]) {
         self.now += FRAME;
