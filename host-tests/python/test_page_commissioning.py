@@ -1,6 +1,7 @@
 """What is done once with a node, on the page in a real browser: its zero, its preset, its cams, its node-ID, its lift, and the files it leaves."""
 
 import csv
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import canopen
 import pytest
 from page import Page, Server
 from selenium.webdriver.common.keys import Keys
-from simulator import PATIENCE, Simulator
+from simulator import PATIENCE, Simulator, nodectl
 
 PRESSURE, ENCODER, LIFT, NEW = 1, 2, 33, 5
 #: A board with a number in the simulator and without a node-ID on the bus.
@@ -205,3 +206,36 @@ def test_the_bit_rate_of_all_nodes_is_changed(driver):
             assert message is not None, f"{silent} are not heard at the new bit rate"
             silent.discard(message.arbitration_id)
     simulator.quit()
+
+
+def activation_and_requests(simulator: Simulator) -> tuple[float, list[float]]:
+    """The time of *activate bit timing* in the log, and the times of the uploads that are asked for after it."""
+    frames = re.findall(r"\((\d+\.\d+)\) \S+ ([0-9A-F]+)#([0-9A-F]*)", simulator.log.read_text())
+    (activation,) = [float(at) for at, can_id, data in frames if can_id == "7E5" and data.startswith("15")]
+    return activation, [float(at) for at, can_id, data in frames if can_id in ("601", "602") and data.startswith("40") and float(at) > activation]
+
+
+@pytest.mark.parametrize("master", ["page", "nodectl"])
+def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str):
+    """Nodes are silent for twice the switch delay (CiA 305)."""
+    simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
+    server = Server(simulator)
+    page = Page(driver, server.url)
+    for node in (1, 2):
+        page.says(f"tr[data-node='{node}']", "STM32F4")
+    ask = """const ask = (node) => window.canopen.bus.request("read", { node, objects: [[0x1000, 0]] });
+        setInterval(() => [1, 2].forEach((node) => ask(node).catch(() => null)), 50);"""
+    if master == "page":
+        page.script(ask)
+        page.request("lss.bit_rate", kbit=250, identity=None, store=True, activate=1000)
+    else:
+        # A request of the page may not cross the command: the page cannot know of it yet.
+        assert nodectl(simulator, "lss", "--all", "set-rate", "250", "--store").returncode == 0
+        assert nodectl(simulator, "lss", "--all", "activate", "1000").returncode == 0
+        page.script(ask)
+    page.until(lambda: len(activation_and_requests(simulator)[1]) > 4, "ask again after the change")
+    page.leave()
+    server.stop()
+    simulator.quit()
+    activation, requests = activation_and_requests(simulator)
+    assert requests[0] >= activation + 2, f"asked at {requests}, the change began at {activation}"

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use canopen::lss::Request;
 use canopen::{Duration, Frame, Instant};
 
 use crate::bus::Bus;
@@ -11,8 +12,6 @@ use crate::values::Scope;
 use crate::{Breach, Findings, Key, Rule, Sheet};
 
 const LSS_REQUEST: u16 = 0x7E5;
-/// LSS: activate bit timing (CiA 305).
-const ACTIVATE_BIT_TIMING: u8 = 21;
 /// Breaches that are kept.
 const KEPT: usize = 1000;
 
@@ -339,13 +338,14 @@ impl Monitor {
                         .for_each(|device| device.command(command, at));
                 }
             }
-            LSS_REQUEST if data.len() == 8 && data[0] == ACTIVATE_BIT_TIMING => {
-                // The delay passes before and after the change.
-                let delay = Duration::from_millis(u16::from_le_bytes([data[1], data[2]]).into());
-                let until = at + delay + delay;
-                self.devices.iter_mut().for_each(|device| device.retunes(until));
-            }
-            LSS_REQUEST => self.devices.iter_mut().for_each(Device::lss),
+            LSS_REQUEST => match data.try_into().ok().and_then(Request::parse) {
+                Some(Request::Activate { delay }) => {
+                    // The delay passes before and after the change.
+                    let until = at + Duration::from_millis(2 * u64::from(delay));
+                    self.devices.iter_mut().for_each(|device| device.retunes(until));
+                }
+                _ => self.devices.iter_mut().for_each(Device::lss),
+            },
             0x601..=0x67F if !frame.is_remote() => {
                 let node = (id - 0x600) as u8;
                 self.devices.iter_mut().for_each(|device| device.request(node, data, at));

@@ -1,11 +1,13 @@
-//! Other SDO clients on the bus.
+//! Other clients on the bus.
 //!
 //! An SDO channel has one client (CiA 301, 7.2.4): a client that sends a request while a transfer of another client
 //! runs disturbs both. This program cannot know whether it is the only client of a node. So it listens to the transfers
-//! of other clients, and sends its request when none runs.
+//! of other clients, and sends its request when none runs. It also listens to other LSS masters: nodes that change their
+//! bit rate are silent.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use canopen::lss::Request;
 use canopen::{Duration, Frame, Instant, NodeId};
 
 use crate::sdo::Channel;
@@ -21,6 +23,20 @@ pub(crate) struct OtherClients {
     /// The additional servers that this program uses.
     additional: Servers,
     channels: BTreeMap<NodeId, Channel>,
+    retuning: Retuning,
+}
+
+/// A frame that comes later after the command to change the bit rate was not in a mailbox of the node before.
+const MAILBOX: Duration = Duration::from_millis(100);
+
+/// The bit rate of nodes changes, by the command of another LSS master.
+#[derive(Debug, Default)]
+struct Retuning {
+    since: Instant,
+    /// When the nodes may send again.
+    until: Instant,
+    /// The nodes that the command was not for: they were heard.
+    heard: BTreeSet<NodeId>,
 }
 
 /// The servers of one kind, one for each node.
@@ -44,11 +60,16 @@ impl OtherClients {
             let frame = channel.to_default(*node, frame)?;
             return self.additional.on_frame(*node, &frame, now);
         }
-        if !matches!(frame.id(), 0x581..=0x5FF | 0x601..=0x67F) {
-            return None;
+        if let Some(delay) = switch_delay(frame) {
+            self.retuning = Retuning { since: now, until: now + delay + delay, heard: BTreeSet::new() };
         }
         let node = NodeId::new(u8::try_from(frame.id() & 0x7F).ok()?)?;
-        self.default.on_frame(node, frame, now)
+        let is_of_node = matches!(frame.id(), 0x581..=0x5FF | 0x701..=0x77F);
+        if is_of_node && now > self.retuning.since + MAILBOX {
+            self.retuning.heard.insert(node);
+        }
+        let is_sdo = matches!(frame.id(), 0x581..=0x5FF | 0x601..=0x67F);
+        is_sdo.then(|| self.default.on_frame(node, frame, now))?
     }
 
     /// The channel that this program uses for a node: the default one where no other is set.
@@ -64,9 +85,11 @@ impl OtherClients {
         };
     }
 
-    /// Whether another client's transfer runs on the channel that this program uses for a node.
+    /// Whether another client's transfer runs on the channel that this program uses for a node, or the node changes its
+    /// bit rate.
     pub(crate) fn is_busy(&self, node: NodeId, now: Instant) -> bool {
         self.servers(node).is_busy(node, now)
+            || (now < self.retuning.until && !self.retuning.heard.contains(&node))
     }
 
     /// The time since the newest frame of another client's transfer on that channel; `None` where there was none.
@@ -101,6 +124,15 @@ impl Servers {
     fn is_busy(&self, node: NodeId, now: Instant) -> bool {
         let is_recent = |heard: &Heard| now.0.saturating_sub(heard.frame.0) < GIVEN_UP.0;
         self.transfers.has(node) && self.heard.get(&node).is_some_and(is_recent)
+    }
+}
+
+/// The delay of the LSS request *activate bit timing*: nodes are silent for twice that time (CiA 305).
+fn switch_delay(frame: &Frame) -> Option<Duration> {
+    let data = frame.data().try_into().ok().filter(|_| frame.id() == 0x7E5)?;
+    match Request::parse(data)? {
+        Request::Activate { delay } => Some(Duration::from_millis(delay.into())),
+        _ => None,
     }
 }
 
@@ -148,6 +180,19 @@ mod tests {
         others.on_frame(&frame(0x605, READ), Instant(0));
         assert!(others.on_frame(&frame(0x585, [0x43, 0x17, 0x10, 0, 1, 0, 0, 0]), Instant(1)).is_none());
         assert!(others.is_busy(node(), Instant(2)));
+    }
+
+    #[test]
+    fn nodes_that_change_their_bit_rate_are_busy_until_then() {
+        let mut others = OtherClients::default();
+        others.on_frame(&frame(0x7E5, [0x15, 100, 0, 0, 0, 0, 0, 0]), Instant(1000));
+        assert!(others.is_busy(node(), Instant(200_999)));
+        assert!(!others.is_busy(node(), Instant(201_000)));
+        let heartbeat = Frame::new(0x705, &[5]).unwrap();
+        others.on_frame(&heartbeat, Instant(2000));
+        assert!(others.is_busy(node(), Instant(150_000)), "the frame was in a mailbox");
+        others.on_frame(&heartbeat, Instant(150_000));
+        assert!(!others.is_busy(node(), Instant(150_001)), "the command is not for a node that is heard");
     }
 
     #[test]

@@ -66,7 +66,9 @@ fn a_request_after_a_pause_is_no_segment() {
 /// The nodes change their bit rate: those that follow are gone from this bus, and a request to them has no answer.
 #[test]
 fn a_request_while_the_bit_rate_changes_needs_no_answer() {
-    for (request, last) in [(1_799_000, None), (1_801_000, None), (1_801_000, Some(1_810_250)), (2_300_000, None)] {
+    for (request, last) in
+        [(1_799_000, None), (1_801_000, None), (1_801_000, Some(1_810_250)), (2_300_000, None)]
+    {
         let mut trace = Trace::clean();
         trace.activate_bit_timing(1_800_000, 100);
         trace.at(request).ask(&[0x40, 0x03, 0x60, 0, 0, 0, 0, 0], &[]);

@@ -14,9 +14,9 @@ const WAITING: usize = 4096;
 /// The frames that a job receives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interest {
-    /// Frames of and for this node: SDO on its channel, also of other clients, and heartbeats.
+    /// Frames of and for this node: SDO on its channel, also of other clients, and heartbeats. Requests of LSS masters.
     Node(NodeId, Channel),
-    /// SDO and heartbeats of all nodes, and answers of LSS slaves.
+    /// SDO and heartbeats of all nodes, and LSS.
     Services,
 }
 
@@ -26,6 +26,7 @@ impl Interest {
         let id = frame.id();
         let is_service = matches!(id, 0x581..=0x5FF | 0x601..=0x67F | 0x701..=0x77F);
         match self {
+            _ if id == 0x7E5 => true,
             Interest::Node(node, channel) => {
                 (is_service && id & 0x7F == u16::from(node.get())) || channel.has(frame)
             }

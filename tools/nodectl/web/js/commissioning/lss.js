@@ -37,7 +37,7 @@ function rate(bus) {
   const rates = select(RATES.map((rate) => [rate, `${rate} kbit/s`]), kbit, (value) => (kbit = Number(value)));
   const change = () => {
     if (!confirm(`Change the bit rate of all nodes to ${kbit} kbit/s? The interface of this computer has to be changed too.`)) return;
-    return result.of("changing", bus.request("lss.bit_rate", { kbit, identity: null, store: true, activate: 1000 }), `${kbit} kbit/s: stored, and in force in a second`);
+    return result.of("changing", bus.request("lss.bit_rate", { kbit, identity: null, store: true, activate: 1000 }), `${kbit} kbit/s: stored, and in force`);
   };
   return el("div", {}, el("div", { class: "bar" }, field("Bit rate of all nodes", rates), button("Change the bit rate", change)), result.line);
 }

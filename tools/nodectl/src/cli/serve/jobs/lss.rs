@@ -60,7 +60,7 @@ pub(super) fn assign(identity: Identity, node: NodeId, store: bool) -> Job {
     })
 }
 
-/// Sets another bit rate for one node or all nodes.
+/// Sets another bit rate for one node or all nodes. Ends when the nodes may send with it.
 pub(super) fn bit_rate(
     kbit: u16,
     identity: Option<Identity>,
@@ -84,6 +84,7 @@ pub(super) fn bit_rate(
         let released = master.release();
         done?;
         released?;
+        context.session.network.pause(Duration::from_millis(2 * u64::from(delay)))?;
         Ok(json!({}))
     }))
 }

@@ -245,7 +245,7 @@ pub(super) fn task(what: What, means: Means) -> Result<Task, String> {
             with(Lane::Everything, lss::assign(identity.into(), node_id.0, store))
         }
         What::LssBitRate { kbit, identity, store, activate } => {
-            with(Lane::Lss, lss::bit_rate(kbit, identity.map(Into::into), store, activate)?)
+            with(Lane::Everything, lss::bit_rate(kbit, identity.map(Into::into), store, activate)?)
         }
         What::Pdos { node } => of(node, pdo::pdos(node.0)),
         What::Map { node, mapping } => of(node, pdo::map(node.0, mapping)),
