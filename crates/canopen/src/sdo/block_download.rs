@@ -18,6 +18,8 @@ pub(super) struct Receiver {
     next_then: u8,
     /// Whether any segment of this block has arrived.
     has_begun: bool,
+    /// The highest sequence number of the block before, which was acknowledged.
+    before: u8,
     /// Whether the last segment of the transfer has arrived, which is `newest` then. The end of the transfer tells how many
     /// of its bytes are data.
     is_complete: bool,
@@ -35,6 +37,7 @@ impl Receiver {
             newest: None,
             next_then: 1,
             has_begun: false,
+            before: 0,
             is_complete: false,
             verdict: Ok(()),
         }
@@ -53,6 +56,14 @@ impl Receiver {
     pub(super) fn highest(&self) -> u8 {
         let newest = self.newest.as_ref().map_or(0, |segment| segment.sequence.get());
         (self.next - 1).max(if self.has_begun { newest } else { 0 })
+    }
+
+    /// The sequence number of the last segment that has arrived.
+    pub(super) fn last(&self) -> u8 {
+        match self.highest() {
+            0 => self.before,
+            highest => highest,
+        }
     }
 
     /// Whether a block has begun and is not complete. If its last segment is lost, only a time-out can end the block.
@@ -118,6 +129,7 @@ impl Receiver {
     /// Begins the next block. Returns the sequence number to acknowledge, or the error of a segment of this block.
     pub(super) fn acknowledge(&mut self) -> Result<u8, Abort> {
         self.verdict?;
+        self.before = self.highest();
         self.has_begun = false;
         self.next_then = 1;
         self.sink.allow_direct(0);

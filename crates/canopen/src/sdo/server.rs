@@ -23,6 +23,8 @@ const BLOCK_PAUSE: Span = Span::from_millis(300);
 const REST_PAUSE: Span = Span::from_millis(100);
 /// How many segments may be lost while a reset of the communication interrupts a block.
 const LOST: u8 = 16;
+/// How long after a time-out the rest of a block may come: a node in bus-off is back earlier.
+const REST_AFTER_TIME_OUT: Span = Span::from_millis(5000);
 
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
@@ -53,8 +55,8 @@ enum Transfer {
     Deferred,
     // The last two together: every frame asks whether it may be a segment of a block, with one comparison.
     BlockDownload(Receiver),
-    /// None: a reset has interrupted a block. The client may still be sending it, so its next segments are no requests.
-    /// The sequence number of the last one.
+    /// None: a reset or a time-out has interrupted a block. The client may still be sending it, so its next segments are
+    /// no requests. The sequence number of the last one.
     Interrupted(u8),
 }
 
@@ -146,22 +148,27 @@ impl<O: Objects> Server<O> {
         is_taken
     }
 
-    /// Takes a segment of an interrupted block. [`answer`](Server::answer) takes the end of the block, after which the
-    /// client listens, and a frame that does not continue the block: it is a request.
+    /// Takes a segment of an interrupted block. [`answer`](Server::answer) takes a frame that does not continue the block:
+    /// it is a request. It also takes the end of the block, after which the client listens, unless the client has its
+    /// answer: the abort message of a time-out.
     #[inline(never)]
     fn take_rest(&mut self, frame: &[u8; 8], now: Tick) -> bool {
         let Transfer::Interrupted(last) = self.transfer else { return false };
+        let is_answered = self.multiplexer.index == 0;
+        let (most, pause) = if is_answered { (1, REST_AFTER_TIME_OUT) } else { (LOST, REST_PAUSE) };
         let rest = BlockSegment::parse(*frame).filter(|segment| {
-            (1..=LOST).contains(&segment.sequence.get().wrapping_sub(last))
-                && now < self.active.plus(REST_PAUSE)
+            (1..=most).contains(&segment.sequence.get().wrapping_sub(last)) && now < self.active.plus(pause)
         });
         let is_end = rest.is_some_and(|segment| segment.last || segment.sequence == BlockSize::MAX);
-        if !is_end {
-            self.transfer =
-                rest.map_or(Transfer::Idle, |segment| Transfer::Interrupted(segment.sequence.get()));
-            self.active = now;
+        if is_end && !is_answered {
+            return false;
         }
-        rest.is_some() && !is_end
+        self.transfer = match rest {
+            Some(segment) if !is_end => Transfer::Interrupted(segment.sequence.get()),
+            _ => Transfer::Idle,
+        };
+        self.active = now;
+        rest.is_some()
     }
 
     /// Takes a request. Returns whether there is a reply.
@@ -282,7 +289,20 @@ impl<O: Objects> Server<O> {
         };
         match acknowledged {
             Ok(sequence) => self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)),
-            Err(abort) => self.settle(Err(abort), objects, now),
+            Err(abort) => {
+                let last = match &self.transfer {
+                    Transfer::BlockDownload(receiver) if O::BLOCK_DOWNLOAD && receiver.expects_segments() => {
+                        Some(receiver.last())
+                    }
+                    _ => None,
+                };
+                let has_reply = self.settle(Err(abort), objects, now);
+                if let Some(last) = last {
+                    (self.transfer, self.multiplexer) =
+                        (Transfer::Interrupted(last), Multiplexer { index: 0, sub: 0 });
+                }
+                has_reply
+            }
         }
     }
 

@@ -313,6 +313,54 @@ fn the_rest_of_a_block_after_a_reset_is_no_request() {
     }
 }
 
+/// The bus is broken for longer than the time-out within a block, and the adapter of the client keeps the rest of the block.
+#[test]
+fn the_rest_of_a_block_after_a_time_out_is_no_request() {
+    for accepted in 1..=126_u8 {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+        for sequence in 1..=accepted {
+            client.send_segment(middle(LIKE_REQUESTS, sequence));
+        }
+        assert_eq!(client.wait(), Some(Response::BlockAcknowledge(accepted, BlockSize::MAX)));
+        client.bench.run(Duration::from_millis(1200));
+        assert_eq!(client.response(), Some(Response::Abort(DOMAIN, 0x0504_0000)), "{accepted}");
+        for sequence in accepted + 1..=127 {
+            let answer = client.send_segment(middle(LIKE_REQUESTS, sequence));
+            assert_eq!(answer, None, "{sequence} after {accepted}");
+        }
+        assert_eq!(client.bench.device.application().downloads, 0);
+        assert_eq!(client.bench.read(0x6100, 0), Ok(vec![0, 0]), "after {accepted}");
+        assert_eq!(client.download(DOMAIN, &data(900)), Response::BlockDownloaded);
+    }
+}
+
+/// A client that begins again, at once or later. A request that looks like the next segment is lost once.
+#[test]
+fn a_request_after_a_time_out_within_a_block_is_answered() {
+    for accepted in (0..=126_u8).filter(|accepted| *accepted != 0x3F) {
+        for pause in [0, 10, 4000] {
+            let mut client = Client::new();
+            client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+            for sequence in 1..=accepted {
+                client.send_segment(middle([0; 7], sequence));
+            }
+            client.bench.run(Duration::from_millis(1500 + pause));
+            client.bench.take();
+            assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]), "{accepted}, after {pause} ms");
+            assert_eq!(client.download(DOMAIN, &data(900)), Response::BlockDownloaded);
+        }
+    }
+    let mut client = Client::new();
+    client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+    for sequence in 1..=0x3F {
+        client.send_segment(middle([0; 7], sequence));
+    }
+    client.bench.run(Duration::from_millis(6500));
+    client.bench.take();
+    assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]), "no rest comes any more");
+}
+
 /// A client that has seen the boot-up message begins again.
 #[test]
 fn a_request_after_a_reset_within_a_block_is_answered() {
