@@ -18,7 +18,7 @@ pub(super) struct Receiver {
     next_then: u8,
     /// Whether any segment of this block has arrived.
     has_begun: bool,
-    /// The highest sequence number of the block before, which was acknowledged.
+    /// The highest sequence number of the block before, if it was acknowledged before its end; otherwise 0.
     before: u8,
     /// Whether the last segment of the transfer has arrived, which is `newest` then. The end of the transfer tells how many
     /// of its bytes are data.
@@ -58,7 +58,7 @@ impl Receiver {
         (self.next - 1).max(if self.has_begun { newest } else { 0 })
     }
 
-    /// The sequence number of the last segment that has arrived.
+    /// The sequence number before the next segment of a client that has missed the last acknowledge.
     pub(super) fn last(&self) -> u8 {
         match self.highest() {
             0 => self.before,
@@ -129,7 +129,7 @@ impl Receiver {
     /// Begins the next block. Returns the sequence number to acknowledge, or the error of a segment of this block.
     pub(super) fn acknowledge(&mut self) -> Result<u8, Abort> {
         self.verdict?;
-        self.before = self.highest();
+        self.before = self.highest() % BlockSize::MAX.get();
         self.has_begun = false;
         self.next_then = 1;
         self.sink.allow_direct(0);

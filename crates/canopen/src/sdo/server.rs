@@ -26,6 +26,9 @@ const LOST: u8 = 16;
 /// How long after a time-out the rest of a block may come: a node in bus-off is back earlier.
 const REST_AFTER_TIME_OUT: Span = Span::from_millis(5000);
 
+/// The object of an interrupted block whose client has its answer: none.
+const ANSWERED: Multiplexer = Multiplexer { index: 0, sub: 0 };
+
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
 pub(crate) struct Server<O> {
@@ -108,6 +111,16 @@ impl<O: Objects> Server<O> {
             && matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.is_within_block())
     }
 
+    /// The block download whose client may send further segments.
+    fn receiver(&self) -> Option<&Receiver> {
+        match &self.transfer {
+            Transfer::BlockDownload(receiver) if O::BLOCK_DOWNLOAD && receiver.expects_segments() => {
+                Some(receiver)
+            }
+            _ => None,
+        }
+    }
+
     /// The next deadline of [`expire`](Server::expire).
     // Not inlined: three callers.
     #[inline(never)]
@@ -121,18 +134,15 @@ impl<O: Objects> Server<O> {
 
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
     pub(crate) fn reset(&mut self, objects: &mut O) {
-        let rest = match &self.transfer {
-            Transfer::BlockDownload(receiver) if O::BLOCK_DOWNLOAD && receiver.expects_segments() => {
-                Transfer::Interrupted(receiver.highest())
-            }
-            Transfer::Interrupted(last) if O::BLOCK_DOWNLOAD => Transfer::Interrupted(*last),
-            _ => {
-                self.multiplexer = Multiplexer { index: 0, sub: 0 };
-                Transfer::Idle
-            }
+        let last = match self.transfer {
+            Transfer::Interrupted(last) if O::BLOCK_DOWNLOAD => Some(last),
+            _ => self.receiver().map(Receiver::highest),
         };
         self.abandon(objects);
-        self.transfer = rest;
+        match last {
+            Some(last) => self.transfer = Transfer::Interrupted(last),
+            None => self.multiplexer = ANSWERED,
+        }
         (self.previous, self.is_answered) = ([0; 8], false);
     }
 
@@ -154,7 +164,7 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     fn take_rest(&mut self, frame: &[u8; 8], now: Tick) -> bool {
         let Transfer::Interrupted(last) = self.transfer else { return false };
-        let is_answered = self.multiplexer.index == 0;
+        let is_answered = self.multiplexer == ANSWERED;
         let (most, pause) = if is_answered { (1, REST_AFTER_TIME_OUT) } else { (LOST, REST_PAUSE) };
         let rest = BlockSegment::parse(*frame).filter(|segment| {
             (1..=most).contains(&segment.sequence.get().wrapping_sub(last)) && now < self.active.plus(pause)
@@ -290,16 +300,10 @@ impl<O: Objects> Server<O> {
         match acknowledged {
             Ok(sequence) => self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)),
             Err(abort) => {
-                let last = match &self.transfer {
-                    Transfer::BlockDownload(receiver) if O::BLOCK_DOWNLOAD && receiver.expects_segments() => {
-                        Some(receiver.last())
-                    }
-                    _ => None,
-                };
+                let last = self.receiver().map(Receiver::last);
                 let has_reply = self.settle(Err(abort), objects, now);
                 if let Some(last) = last {
-                    (self.transfer, self.multiplexer) =
-                        (Transfer::Interrupted(last), Multiplexer { index: 0, sub: 0 });
+                    (self.transfer, self.multiplexer) = (Transfer::Interrupted(last), ANSWERED);
                 }
                 has_reply
             }
