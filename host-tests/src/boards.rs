@@ -38,6 +38,13 @@ impl Observer for Listener {
         }
     }
 
+    fn failed(&mut self, start: Time, frame: &Frame, board: Option<usize>) {
+        if let Some(frame) = from_bus(frame) {
+            let sender = board.map_or(Sender::Other, Sender::Node);
+            self.0.monitor().failed(instant(start), &frame, sender);
+        }
+    }
+
     fn incident(&mut self, at: Time, board: usize, incident: &Reset) {
         let incident = match incident {
             Reset::SoftwareReset => Incident::SoftwareReset,

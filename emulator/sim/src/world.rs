@@ -42,6 +42,8 @@ pub trait Observer {
     fn bit_rate(&mut self, bits_per_second: u32);
     /// A frame has ended. `board`: its sender, in the order of the command line; `None` for any other participant.
     fn frame(&mut self, at: Time, frame: &Frame, board: Option<usize>);
+    /// A frame that began at `start` has failed for its sender, which sends it again. Others may have received it.
+    fn failed(&mut self, start: Time, frame: &Frame, board: Option<usize>);
     /// An incident of a board.
     fn incident(&mut self, at: Time, board: usize, incident: &Incident);
     /// A board was switched on or off.
@@ -317,10 +319,15 @@ impl World {
         let (records, observer, count) = (&mut self.records, &mut self.observer, self.observed.len());
         self.bus.step(&mut participants, self.now, &mut |event| {
             records.on_event(&event);
-            if let (Some(observer), &Event::Frame { end, frame, transmitter, .. }) =
-                (observer.as_mut(), &event)
-            {
-                observer.frame(end, &frame, Some(transmitter).filter(|transmitter| *transmitter < count));
+            let Some(observer) = observer.as_mut() else { return };
+            let board = |transmitter| Some(transmitter).filter(|transmitter| *transmitter < count);
+            match event {
+                Event::Frame { end, frame, transmitter, .. } => {
+                    observer.frame(end, &frame, board(transmitter));
+                }
+                Event::Error { start, frame, transmitter, .. } => {
+                    observer.failed(start, &frame, board(transmitter));
+                }
             }
         })
     }

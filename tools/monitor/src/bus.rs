@@ -45,11 +45,13 @@ pub(crate) struct Bus {
     /// Start of the traffic without a pause that the newest frame ends, in us.
     busy_since: f64,
     pub(crate) recent: VecDeque<Passed>,
+    /// Frames that were received and have failed for the devices that have sent them: they come again.
+    failed: Vec<(usize, Frame)>,
 }
 
 impl Bus {
     pub(crate) fn new() -> Bus {
-        Bus { bit: Bit::Seen(0.0), busy_since: 0.0, recent: VecDeque::new() }
+        Bus { bit: Bit::Seen(0.0), busy_since: 0.0, recent: VecDeque::new(), failed: Vec::new() }
     }
 
     pub(crate) fn set_bit_rate(&mut self, bits_per_second: u32) {
@@ -91,7 +93,8 @@ impl Bus {
             self.bit = Bit::Seen(rate.max(1e6 * f64::from(bits(frame)) / span).min(1e6));
         }
         let start = end - f64::from(bits(frame) - 3) * self.bit();
-        let is_repeated = self.is_real() && self.is_repetition(start, frame, device);
+        let is_repeated =
+            self.comes_again(frame, device) || self.is_real() && self.is_repetition(start, frame, device);
         if self.recent.back().is_none_or(|last| start - last.end > GAP * self.bit() + 1.0) {
             self.busy_since = start;
         }
@@ -100,6 +103,28 @@ impl Bus {
         }
         self.recent.push_back(Passed { start, end, at, frame: *frame, device });
         is_repeated
+    }
+
+    /// A frame that began at `start` has failed for the device that has sent it.
+    pub(crate) fn failed(&mut self, start: Instant, frame: &Frame, device: usize) {
+        let was_received = self.recent.back().is_some_and(|last| {
+            last.end > start.0 as f64 && (last.device, last.frame) == (Some(device), *frame)
+        });
+        if was_received && !self.failed.contains(&(device, *frame)) {
+            self.failed.push((device, *frame));
+        }
+    }
+
+    /// A device forgets the frames that it has to send again.
+    pub(crate) fn forget_failed(&mut self, device: usize) {
+        self.failed.retain(|(of, _)| *of != device);
+    }
+
+    /// Whether the frame has failed before. Another frame with its CAN-ID shows that the device does not send it again.
+    fn comes_again(&mut self, frame: &Frame, device: Option<usize>) -> bool {
+        let failed =
+            self.failed.extract_if(.., |(of, failed)| Some(*of) == device && failed.id() == frame.id());
+        failed.collect::<Vec<_>>().iter().any(|(_, failed)| failed == frame)
     }
 
     /// Whether the frame follows an equal one of its sender without a pause, after an error frame. Between the two of an SDO server, more
@@ -228,6 +253,29 @@ mod tests {
             bus.take(Instant(at as u64), &frame(id, &data), None);
         }
         assert!((bus.bit() - 8.0).abs() < 1e-9, "125 kbit/s: {}", bus.bit());
+    }
+
+    #[test]
+    fn a_frame_that_was_received_and_has_failed_comes_again_once() {
+        let (mut bus, answer, other) = (Bus::new(), frame(0x581, &[1; 8]), frame(0x181, &[2; 8]));
+        bus.set_bit_rate(1_000_000);
+        assert!(!bus.take(Instant(1000), &answer, Some(0)));
+        bus.failed(Instant(880), &answer, 0);
+        assert!(!bus.take(Instant(400_000), &other, Some(0)));
+        bus.failed(Instant(400_500), &answer, 0);
+        assert!(
+            bus.take(Instant(401_000), &answer, Some(0)),
+            "that it fails again without a receiver changes nothing"
+        );
+        assert!(!bus.take(Instant(500_000), &answer, Some(0)), "an answer of its own");
+        bus.failed(Instant(600_000), &answer, 0);
+        assert!(!bus.take(Instant(600_200), &answer, Some(0)), "nobody has received the failed one");
+        bus.failed(Instant(600_100), &answer, 0);
+        assert!(!bus.take(Instant(610_000), &frame(0x581, &[3; 8]), Some(0)));
+        assert!(!bus.take(Instant(620_000), &answer, Some(0)), "the node has given it up");
+        bus.failed(Instant(619_900), &answer, 0);
+        bus.forget_failed(0);
+        assert!(!bus.take(Instant(700_000), &answer, Some(0)), "a node that restarts has nothing to repeat");
     }
 
     #[test]

@@ -137,6 +137,14 @@ impl Monitor {
         }
     }
 
+    /// A frame that began at `start` has failed for its sender, which sends it again. Others may have received it, and get
+    /// it twice then.
+    pub fn failed(&mut self, start: Instant, frame: &Frame, sender: Sender) {
+        if let Some(device) = self.sender(frame, sender) {
+            self.bus.failed(start, frame, device);
+        }
+    }
+
     /// Time passes.
     pub fn advance(&mut self, now: Instant) {
         self.now = self.now.max(now);
@@ -153,6 +161,7 @@ impl Monitor {
         let own = self.participant(participant);
         let device = &mut self.devices[own];
         let was_injected = device.is_injected();
+        self.bus.forget_failed(own);
         match incident {
             Incident::Restart => device.may_restart(),
             Incident::Touched => device.touch(),

@@ -18,8 +18,8 @@ pub(super) struct Receiver {
     next_then: u8,
     /// Whether any segment of this block has arrived.
     has_begun: bool,
-    /// The highest sequence number of the block before, if it was acknowledged before its end; otherwise 0.
-    before: u8,
+    /// The sequence number of the last acknowledge.
+    acknowledged: u8,
     /// Whether the last segment of the transfer has arrived, which is `newest` then. The end of the transfer tells how many
     /// of its bytes are data.
     is_complete: bool,
@@ -37,7 +37,7 @@ impl Receiver {
             newest: None,
             next_then: 1,
             has_begun: false,
-            before: 0,
+            acknowledged: 0,
             is_complete: false,
             verdict: Ok(()),
         }
@@ -58,10 +58,12 @@ impl Receiver {
         (self.next - 1).max(if self.has_begun { newest } else { 0 })
     }
 
-    /// The sequence number before the next segment of a client that has missed the last acknowledge.
-    pub(super) fn last(&self) -> u8 {
+    /// The sequence number before the client's next segment. After an acknowledge within a block, it depends on whether the
+    /// client has heard it.
+    pub(super) fn last(&self, has_heard: bool) -> u8 {
         match self.highest() {
-            0 => self.before,
+            // A whole block is followed by another one.
+            0 if !has_heard && self.acknowledged < BlockSize::MAX.get() => self.acknowledged,
             highest => highest,
         }
     }
@@ -129,11 +131,12 @@ impl Receiver {
     /// Begins the next block. Returns the sequence number to acknowledge, or the error of a segment of this block.
     pub(super) fn acknowledge(&mut self) -> Result<u8, Abort> {
         self.verdict?;
-        self.before = self.highest() % BlockSize::MAX.get();
+        self.acknowledged = self.next - 1;
         self.has_begun = false;
         self.next_then = 1;
         self.sink.allow_direct(0);
-        Ok(core::mem::replace(&mut self.next, 1) - 1)
+        self.next = 1;
+        Ok(self.acknowledged)
     }
 
     /// Completes the transfer.

@@ -23,11 +23,10 @@ const BLOCK_PAUSE: Span = Span::from_millis(300);
 const REST_PAUSE: Span = Span::from_millis(100);
 /// How many segments may be lost while a reset of the communication interrupts a block.
 const LOST: u8 = 16;
-/// How long after a time-out the rest of a block may come: a node in bus-off is back earlier.
+/// The same after a time-out: a node in bus-off is back earlier, and an adapter in bus-off may lose the frame that it sends.
+/// The client may have its answer and begin again, so no more frames may look like segments.
 const REST_AFTER_TIME_OUT: Span = Span::from_millis(5000);
-
-/// The object of an interrupted block whose client has its answer: none.
-const ANSWERED: Multiplexer = Multiplexer { index: 0, sub: 0 };
+const LOST_AFTER_TIME_OUT: u8 = 2;
 
 /// The state of the only SDO channel (1200h).
 #[derive(Debug)]
@@ -59,8 +58,11 @@ enum Transfer {
     // The last two together: every frame asks whether it may be a segment of a block, with one comparison.
     BlockDownload(Receiver),
     /// None: a reset or a time-out has interrupted a block. The client may still be sending it, so its next segments are
-    /// no requests. The sequence number of the last one.
-    Interrupted(u8),
+    /// no requests. They come until `active`, and the sequence number of the next one is higher by `most` at most.
+    Interrupted {
+        last: u8,
+        most: u8,
+    },
 }
 
 /// Whether there is a reply now.
@@ -92,7 +94,7 @@ impl<O: Objects> Server<O> {
 
     /// Whether no transfer is under way.
     pub(crate) fn is_idle(&self) -> bool {
-        matches!(self.transfer, Transfer::Idle | Transfer::Interrupted(_))
+        matches!(self.transfer, Transfer::Idle | Transfer::Interrupted { .. })
     }
 
     /// Whether no transfer is under way, or one whose response waits for [`release`](Server::release).
@@ -102,7 +104,8 @@ impl<O: Objects> Server<O> {
 
     /// Whether a block download is under way, or one was interrupted.
     pub(crate) fn takes_block(&self) -> bool {
-        O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::BlockDownload(_) | Transfer::Interrupted(_))
+        O::BLOCK_DOWNLOAD
+            && matches!(self.transfer, Transfer::BlockDownload(_) | Transfer::Interrupted { .. })
     }
 
     /// Whether the client is sending a block.
@@ -126,7 +129,7 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(crate) fn deadline(&self) -> Tick {
         match &self.transfer {
-            Transfer::Idle | Transfer::Interrupted(_) => Tick::NEVER,
+            Transfer::Idle | Transfer::Interrupted { .. } => Tick::NEVER,
             _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
             _ => self.active.plus(TIME_OUT),
         }
@@ -134,16 +137,11 @@ impl<O: Objects> Server<O> {
 
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
     pub(crate) fn reset(&mut self, objects: &mut O) {
-        let last = match self.transfer {
-            Transfer::Interrupted(last) if O::BLOCK_DOWNLOAD => Some(last),
-            _ => self.receiver().map(Receiver::highest),
-        };
-        self.abandon(objects);
-        match last {
-            Some(last) => self.transfer = Transfer::Interrupted(last),
-            None => self.multiplexer = ANSWERED,
-        }
         (self.previous, self.is_answered) = ([0; 8], false);
+        self.break_off(LOST, self.active, objects);
+        if matches!(self.transfer, Transfer::Idle) {
+            self.multiplexer = Multiplexer { index: 0, sub: 0 };
+        }
     }
 
     /// Takes a frame that is a segment within a block and only has to be copied to the buffer. Returns whether the
@@ -158,27 +156,42 @@ impl<O: Objects> Server<O> {
         is_taken
     }
 
+    /// Ends the transfer. The client of a block may still be sending it.
+    #[inline(never)]
+    fn break_off(&mut self, most: u8, now: Tick, objects: &mut O) {
+        if matches!(self.transfer, Transfer::Interrupted { .. }) {
+            return;
+        }
+        let last = self.receiver().map(|receiver| receiver.last(most == LOST));
+        self.abandon(objects);
+        if let Some(last) = last {
+            self.interrupt(last, most, now);
+        }
+    }
+
     /// Takes a segment of an interrupted block. [`answer`](Server::answer) takes a frame that does not continue the block:
     /// it is a request. It also takes the end of the block, after which the client listens, unless the client has its
     /// answer: the abort message of a time-out.
     #[inline(never)]
     fn take_rest(&mut self, frame: &[u8; 8], now: Tick) -> bool {
-        let Transfer::Interrupted(last) = self.transfer else { return false };
-        let is_answered = self.multiplexer == ANSWERED;
-        let (most, pause) = if is_answered { (1, REST_AFTER_TIME_OUT) } else { (LOST, REST_PAUSE) };
+        let Transfer::Interrupted { last, most } = self.transfer else { return false };
         let rest = BlockSegment::parse(*frame).filter(|segment| {
-            (1..=most).contains(&segment.sequence.get().wrapping_sub(last)) && now < self.active.plus(pause)
+            (1..=most).contains(&segment.sequence.get().wrapping_sub(last)) && now < self.active
         });
         let is_end = rest.is_some_and(|segment| segment.last || segment.sequence == BlockSize::MAX);
-        if is_end && !is_answered {
-            return false;
+        match rest {
+            Some(_) if is_end && most == LOST => return false,
+            // The client may have begun another block before it has heard of the end.
+            Some(segment) => self.interrupt(if is_end { 0 } else { segment.sequence.get() }, most, now),
+            None => self.transfer = Transfer::Idle,
         }
-        self.transfer = match rest {
-            Some(segment) if !is_end => Transfer::Interrupted(segment.sequence.get()),
-            _ => Transfer::Idle,
-        };
-        self.active = now;
         rest.is_some()
+    }
+
+    /// Waits for the rest of a block.
+    fn interrupt(&mut self, last: u8, most: u8, now: Tick) {
+        let pause = if most == LOST { REST_PAUSE } else { REST_AFTER_TIME_OUT };
+        (self.transfer, self.active) = (Transfer::Interrupted { last, most }, now.plus(pause));
     }
 
     /// Takes a request. Returns whether there is a reply.
@@ -199,7 +212,7 @@ impl<O: Objects> Server<O> {
     /// Takes a request of a series, which may repeat the request before.
     #[inline(never)]
     fn answer_in_series(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
-        if O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::Interrupted(_)) {
+        if O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::Interrupted { .. }) {
             return self.give_up(Abort::DeviceState, objects);
         }
         let is_repeated = *frame == self.previous;
@@ -267,7 +280,7 @@ impl<O: Objects> Server<O> {
                 Transfer::BlockUpload(sender) => sender.source().close(false, objects),
                 Transfer::Download(download) => download.sink().abandon(objects),
                 Transfer::BlockDownload(receiver) => receiver.sink().abandon(objects),
-                Transfer::Idle | Transfer::Interrupted(_) | Transfer::Deferred => (),
+                Transfer::Idle | Transfer::Interrupted { .. } | Transfer::Deferred => (),
             }
         }
         self.transfer = Transfer::Idle;
@@ -300,12 +313,8 @@ impl<O: Objects> Server<O> {
         match acknowledged {
             Ok(sequence) => self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)),
             Err(abort) => {
-                let last = self.receiver().map(Receiver::last);
-                let has_reply = self.settle(Err(abort), objects, now);
-                if let Some(last) = last {
-                    (self.transfer, self.multiplexer) = (Transfer::Interrupted(last), ANSWERED);
-                }
-                has_reply
+                self.break_off(LOST_AFTER_TIME_OUT, now, objects);
+                self.abort(abort)
             }
         }
     }
@@ -321,6 +330,11 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     fn give_up(&mut self, abort: Abort, objects: &mut O) -> bool {
         self.abandon(objects);
+        self.abort(abort)
+    }
+
+    /// Stores the abort message.
+    fn abort(&mut self, abort: Abort) -> bool {
         self.is_answered = false;
         self.set_reply(Response::Abort(self.multiplexer, abort.code()))
     }

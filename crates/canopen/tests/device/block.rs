@@ -327,8 +327,10 @@ fn the_rest_of_a_block_after_a_time_out_is_no_request() {
         answers.retain(|(id, _)| *id == 0x585);
         let is_acknowledged = (1..127).contains(&accepted);
         assert_eq!(answers.len(), 1 + usize::from(is_acknowledged), "{accepted}: {answers:?}");
-        // A block that has arrived as a whole is followed by another one.
-        for sequence in accepted % 127 + 1..=127 {
+        // A block that has arrived as a whole is followed by another one. The adapter may lose the frame that it sends.
+        let next = (accepted % 127 + 1 + accepted % 2).min(127);
+        // The client may have begun another block.
+        for sequence in (next..=127).chain(1..=127) {
             let answer = client.send_segment(middle(LIKE_REQUESTS, sequence));
             assert_eq!(answer, None, "{sequence} after {accepted}");
         }
@@ -341,7 +343,7 @@ fn the_rest_of_a_block_after_a_time_out_is_no_request() {
 /// A client that begins again, at once or later. A request that looks like the next segment is lost once.
 #[test]
 fn a_request_after_a_time_out_within_a_block_is_answered() {
-    for accepted in (0..=126_u8).filter(|accepted| *accepted != 0x3F) {
+    for accepted in (0..=126_u8).filter(|accepted| !(0x3E..=0x3F).contains(accepted)) {
         for pause in [0, 10, 4000] {
             let mut client = Client::new();
             client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });

@@ -67,7 +67,7 @@ impl Error {
     #[must_use]
     pub fn is_disturbed(&self) -> bool {
         let is_unexpected = matches!(self.cause, Cause::Transfer(sdo::Error::Unexpected));
-        is_unexpected || self.abort().is_some_and(AbortCode::is_protocol)
+        is_unexpected || self.abort().is_some_and(|code| code.is_protocol() || code.is_time_out())
     }
 }
 

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::Status;
 use crate::bus::BusError;
-use crate::sdo;
+use crate::sdo::{self, AbortCode};
 
 /// Why a node was not updated. If not stated otherwise, the node can be reached and the update can be tried again.
 #[derive(Debug, Error)]
@@ -97,7 +97,8 @@ impl Error {
     /// Whether the node or the bus was lost, so that continuing may succeed.
     pub(super) fn is_silence(&self) -> bool {
         match self {
-            Error::Sdo(error) => error.is_silence(),
+            // A node that has not heard this program for a while is lost, too.
+            Error::Sdo(error) => error.is_silence() || error.abort().is_some_and(AbortCode::is_time_out),
             Error::Bus(error) => matches!(error, BusError::Lost(_)),
             _ => false,
         }

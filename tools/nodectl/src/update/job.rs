@@ -300,7 +300,8 @@ impl<'a> Job<'a> {
         // The node also answers the segments that were on their way.
         let _ = network.pause(POLL);
         let is_refused = |status: &Status| !status.busy && status.code != 0;
-        let status = error.abort().and_then(|_| self.program(network).status().ok().flatten());
+        let is_told = error.abort().is_some_and(|code| !code.is_time_out());
+        let status = if is_told { self.program(network).status().ok().flatten() } else { None };
         match status.filter(is_refused) {
             Some(status) => Error::Flash { node: self.node, status },
             None => error.into(),

@@ -61,7 +61,13 @@ impl AbortCode {
     /// Whether the server refused the protocol and not the value: another kind of transfer may succeed.
     #[must_use]
     pub fn is_protocol(self) -> bool {
-        matches!(self.0 >> 16, 0x0503 | 0x0504)
+        matches!(self.0 >> 16, 0x0503 | 0x0504) && !self.is_time_out()
+    }
+
+    /// Whether the server has waited too long for the client: frames were lost.
+    #[must_use]
+    pub fn is_time_out(self) -> bool {
+        self == Abort::TimeOut.into()
     }
 }
 
