@@ -3,6 +3,7 @@
 mod adapter;
 mod barriers;
 mod bringup;
+mod broken_line;
 mod budget;
 mod bus_faults;
 mod calibration;

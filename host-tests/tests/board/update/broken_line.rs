@@ -5,10 +5,10 @@ use fastrand::Rng;
 use host_tests::thorough::either;
 use host_tests::watch::expects;
 use monitor::Rule;
-use sim::world::World;
 
 use super::bench::{version_a, version_b};
 use super::fleet::{PERSONALITIES, Shared, share, update_while};
+use crate::broken_line::noise;
 use crate::support::world;
 
 /// Longer than the period of the heartbeat, so that each node has something to send in it.
@@ -17,20 +17,6 @@ const NOISE: Time = Time::from_millis(1500);
 /// download.
 fn latest(kbit: u64) -> u64 {
     5000 + 2_200_000 / kbit
-}
-
-/// The line is broken from this instant on for [`NOISE`].
-fn noise(begin: Time) -> impl FnMut(&mut World) {
-    let mut is_on = false;
-    move |world| {
-        let is_wanted = (begin..begin + NOISE).contains(&world.now());
-        if is_wanted && !is_on {
-            world.bus().faults.noise(1, 1.0);
-        } else if is_on && !is_wanted {
-            world.bus().faults.quiet();
-        }
-        is_on = is_wanted;
-    }
 }
 
 #[test]
@@ -44,7 +30,7 @@ fn nodectl_completes_an_update_over_a_line_that_breaks_at_any_time() {
         let world: Shared = share(world(&format!("--bitrate {kbit} --node {node}:{personality}")));
         let begin = world.borrow().now() + Time::from_millis(rng.u64(..latest(kbit)));
         let image = version_b(0);
-        let result = update_while(&world, &node.to_string(), &image, noise(begin), &[]);
+        let result = update_while(&world, &node.to_string(), &image, noise(begin, NOISE), &[]);
         let told = format!("{personality} at {node}, {kbit} kbit/s, noise from {:.3} s", begin.as_secs_f64());
         let reports = result.unwrap_or_else(|error| panic!("{told}: {error}"));
         println!("{told}: {:.1} s", world.borrow().now().as_secs_f64());
