@@ -114,11 +114,13 @@ impl<O: Objects> Server<O> {
             && matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.is_within_block())
     }
 
-    /// The block download whose client may send further segments.
-    fn receiver(&self) -> Option<&Receiver> {
+    /// The sequence number before the next segment of a client that may send further ones. `has_heard`: it has the last
+    /// acknowledge.
+    #[inline(never)]
+    fn last(&self, has_heard: bool) -> Option<u8> {
         match &self.transfer {
             Transfer::BlockDownload(receiver) if O::BLOCK_DOWNLOAD && receiver.expects_segments() => {
-                Some(receiver)
+                Some(receiver.last(has_heard))
             }
             _ => None,
         }
@@ -138,9 +140,14 @@ impl<O: Objects> Server<O> {
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
     pub(crate) fn reset(&mut self, objects: &mut O) {
         (self.previous, self.is_answered) = ([0; 8], false);
-        self.break_off(LOST, self.active, objects);
-        if matches!(self.transfer, Transfer::Idle) {
-            self.multiplexer = Multiplexer { index: 0, sub: 0 };
+        if O::BLOCK_DOWNLOAD && matches!(self.transfer, Transfer::Interrupted { .. }) {
+            return;
+        }
+        let last = self.last(true);
+        self.abandon(objects);
+        match last {
+            Some(last) => self.interrupt(last, LOST, self.active),
+            None => self.multiplexer = Multiplexer { index: 0, sub: 0 },
         }
     }
 
@@ -154,19 +161,6 @@ impl<O: Objects> Server<O> {
             self.active = now;
         }
         is_taken
-    }
-
-    /// Ends the transfer. The client of a block may still be sending it.
-    #[inline(never)]
-    fn break_off(&mut self, most: u8, now: Tick, objects: &mut O) {
-        if matches!(self.transfer, Transfer::Interrupted { .. }) {
-            return;
-        }
-        let last = self.receiver().map(|receiver| receiver.last(most == LOST));
-        self.abandon(objects);
-        if let Some(last) = last {
-            self.interrupt(last, most, now);
-        }
     }
 
     /// Takes a segment of an interrupted block. [`answer`](Server::answer) takes a frame that does not continue the block:
@@ -189,6 +183,7 @@ impl<O: Objects> Server<O> {
     }
 
     /// Waits for the rest of a block.
+    #[inline(never)]
     fn interrupt(&mut self, last: u8, most: u8, now: Tick) {
         let pause = if most == LOST { REST_PAUSE } else { REST_AFTER_TIME_OUT };
         (self.transfer, self.active) = (Transfer::Interrupted { last, most }, now.plus(pause));
@@ -313,8 +308,12 @@ impl<O: Objects> Server<O> {
         match acknowledged {
             Ok(sequence) => self.set_reply(Response::BlockAcknowledge(sequence, BlockSize::MAX)),
             Err(abort) => {
-                self.break_off(LOST_AFTER_TIME_OUT, now, objects);
-                self.abort(abort)
+                let last = self.last(false);
+                let has_reply = self.settle(Err(abort), objects, now);
+                if let Some(last) = last {
+                    self.interrupt(last, LOST_AFTER_TIME_OUT, now);
+                }
+                has_reply
             }
         }
     }
@@ -330,11 +329,6 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     fn give_up(&mut self, abort: Abort, objects: &mut O) -> bool {
         self.abandon(objects);
-        self.abort(abort)
-    }
-
-    /// Stores the abort message.
-    fn abort(&mut self, abort: Abort) -> bool {
         self.is_answered = false;
         self.set_reply(Response::Abort(self.multiplexer, abort.code()))
     }
