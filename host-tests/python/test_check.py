@@ -23,9 +23,9 @@ def check(simulator: Simulator, only: list[str]) -> dict[str, str]:
     done = nodectl(simulator, "--json", "check", "--yes", *flags, node=5)
     try:
         report = json.loads(done.stdout.splitlines()[-1])
-    except (IndexError, ValueError):
-        raise AssertionError(f"no report, exit code {done.returncode}: {done.stderr}") from None
-    failed = [result for result in report["checks"] if result["verdict"] == "failed"]
+        failed = [result for result in report["checks"] if result["verdict"] == "failed"]
+    except (IndexError, KeyError, ValueError):
+        raise AssertionError(f"no report, exit code {done.returncode}: {done.stdout[-2000:]} {done.stderr}") from None
     assert done.returncode == (9 if failed or report["left_behind"] else 0), done.stderr
     assert not report["left_behind"], report["left_behind"]
     return {result["id"]: f"expected {result['expected']}, seen {result['seen']}" for result in failed}
