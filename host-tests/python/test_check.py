@@ -22,7 +22,8 @@ def check(simulator: Simulator, only: list[str]) -> dict[str, str]:
     flags = ["--only", ",".join(only)] if only else []
     done = nodectl(simulator, "--json", "check", "--yes", *flags, node=5)
     try:
-        report = json.loads(done.stdout.splitlines()[-1])
+        # The report is the first line; where a check has failed, the error of the command follows.
+        report = json.loads(done.stdout.splitlines()[0])
         failed = [result for result in report["checks"] if result["verdict"] == "failed"]
     except (IndexError, KeyError, ValueError):
         raise AssertionError(f"no report, exit code {done.returncode}: {done.stdout[-2000:]} {done.stderr}") from None

@@ -57,6 +57,8 @@ pub(crate) struct Values {
     node_id: u8,
     /// The sub-index of 1010h that is requested and not answered.
     saving: Option<u8>,
+    /// The object that a client writes: the node may act by the new value before its answer is on the bus.
+    pending: Option<Key>,
 }
 
 /// The values that a reset loads.
@@ -106,7 +108,8 @@ impl Values {
 
     /// The present value, where nothing can have changed it since it was seen.
     pub(crate) fn sure_number(&self, index: u16, sub: u8) -> Option<u32> {
-        self.held.get(&(index, sub)).filter(|held| held.is_sure)?;
+        let is_pending = self.pending == Some((index, sub));
+        self.held.get(&(index, sub)).filter(|held| held.is_sure && !is_pending)?;
         self.number(index, sub)
     }
 
@@ -128,6 +131,7 @@ impl Values {
 
     /// A value was read.
     pub(crate) fn read(&mut self, key: Key, bytes: &[u8], findings: &mut Findings) {
+        self.pending = None;
         let is_parameter = Sheet::is_parameter(self.sheet.as_ref(), key);
         let held = self.held.entry(key).or_default();
         let before = held.present.replace(bytes.to_vec());
@@ -169,6 +173,7 @@ impl Values {
 
     /// A download begins.
     pub(crate) fn begins(&mut self, key: Key, value: Option<&[u8]>) {
+        self.pending = Some(key);
         if key.0 == 0x1010 && value == Some(SAVE) {
             self.saving = Some(key.1);
         }
@@ -176,6 +181,7 @@ impl Values {
 
     /// A download was aborted.
     pub(crate) fn aborted(&mut self, key: Key, tried: &[u8]) {
+        self.pending = None;
         if key.0 == 0x1010 {
             self.saving = None;
         }
@@ -188,6 +194,7 @@ impl Values {
 
     /// A download was accepted.
     pub(crate) fn written(&mut self, key: Key, bytes: &[u8]) {
+        self.pending = None;
         match (key.0, bytes) {
             (0x1010, SAVE) => self.save(key.1),
             (0x1011, LOAD) => self.restore(key.1),

@@ -63,6 +63,25 @@ fn a_request_after_a_pause_is_no_segment() {
     assert_eq!(text(&judged(&trace)), "");
 }
 
+/// An EMCY has a higher priority than the answer to the request that ends its inhibit time.
+#[test]
+fn a_node_acts_by_a_new_value_before_its_answer() {
+    let mut trace = Trace::clean();
+    trace.at(1_500_500).write(0x1015, 0, &10_000_u16.to_le_bytes());
+    trace.node(1_510_000, 0, 0x085, &[0x06, 0x50, 1, 0, 0, 0, 0, 0]);
+    trace.at(1_619_000).ask(&[0x2B, 0x15, 0x10, 0, 0, 0, 0, 0], &[]);
+    trace.node(1_620_000, 0, 0x085, &[0; 8]);
+    trace.at(1_620_000).answer(&[0x60, 0x15, 0x10, 0, 0, 0, 0, 0]);
+    assert_eq!(text(&judged(&trace)), "");
+    let mut trace = Trace::clean();
+    trace.at(1_500_500).write(0x1015, 0, &10_000_u16.to_le_bytes());
+    trace.node(1_510_000, 0, 0x085, &[0x06, 0x50, 1, 0, 0, 0, 0, 0]);
+    trace.node(1_619_000, 0, 0x085, &[0; 8]);
+    trace.at(1_619_500).ask(&[0x2B, 0x15, 0x10, 0, 0, 0, 0, 0], &[0x60, 0x15, 0x10, 0, 0, 0, 0, 0]);
+    let monitor = judged(&trace);
+    assert_eq!(monitor.breaches()[0].rule, Rule::Inhibit, "{}", text(&monitor));
+}
+
 /// The nodes change their bit rate: those that follow are gone from this bus, and a request to them has no answer.
 #[test]
 fn a_request_while_the_bit_rate_changes_needs_no_answer() {

@@ -256,7 +256,7 @@ impl Trace {
         }
     }
 
-    fn answer(&mut self, answer: &[u8]) {
+    pub(crate) fn answer(&mut self, answer: &[u8]) {
         self.now += FRAME;
         self.node(self.now, 0, 0x585, answer);
     }
