@@ -92,7 +92,7 @@ fn a_request_while_the_bit_rate_changes_needs_no_answer() {
         trace.activate_bit_timing(1_800_000, 100);
         trace.at(request).ask(&[0x40, 0x03, 0x60, 0, 0, 0, 0, 0], &[]);
         if let Some(at) = last {
-            // It was in a mailbox.
+            // The frame was in a mailbox before the command.
             trace.node(at, 0, 0x705, &[127]);
         }
         trace.client(3_400_000, 0x080, &[]);
