@@ -76,6 +76,16 @@ impl Desk {
         result
     }
 
+    /// Runs a command over noise, and again on a line in order if it fails. Returns whether the first run was answered.
+    fn insist(&mut self, words: &[&str]) -> bool {
+        let result = self.run_over_noise(words);
+        if let Err(failure) = &result {
+            println!("{}: {words:?}: {failure}", self.told);
+            self.done(words);
+        }
+        result.is_ok()
+    }
+
     /// Runs a command on a line in order.
     fn done(&self, words: &[&str]) -> String {
         self.run(words, |_| ()).unwrap_or_else(|failure| panic!("{}: {words:?}: {failure}", self.told))
@@ -100,22 +110,9 @@ fn a_value_is_written_and_saved_over_a_line_that_breaks() {
     for case in 0..either(12, 100) {
         let mut desk = Desk::new(case);
         let value = 2000 + case as u64;
-        let written = desk.run_over_noise(&["write", "1017", &value.to_string()]);
-        match &written {
-            Ok(_) => assert_eq!(desk.heartbeat(), value, "{}", desk.told),
-            Err(failure) => {
-                lost += 1;
-                println!("{}: write: {failure}", desk.told);
-                desk.done(&["write", "1017", &value.to_string()]);
-            }
-        }
-        match desk.run_over_noise(&["save"]) {
-            Ok(_) => answered += 1,
-            Err(failure) => {
-                println!("{}: save: {failure}", desk.told);
-                desk.done(&["save"]);
-            }
-        }
+        lost += usize::from(!desk.insist(&["write", "1017", &value.to_string()]));
+        assert_eq!(desk.heartbeat(), value, "{}", desk.told);
+        answered += usize::from(desk.insist(&["save"]));
         desk.power_cycle();
         assert_eq!(desk.heartbeat(), value, "{}", desk.told);
     }
@@ -129,15 +126,9 @@ fn a_node_gets_its_node_id_over_a_line_that_breaks() {
     for case in 0..either(12, 100) {
         let mut desk = Desk::new(case);
         let id = 2 + case as u8 % 100;
-        let set = ["lss", "set-id", &id.to_string(), "--store"];
-        match desk.run_over_noise(&set) {
-            Ok(_) => answered += 1,
-            Err(failure) => {
-                lost += 1;
-                println!("{}: {failure}", desk.told);
-                desk.done(&set);
-            }
-        }
+        let is_answered = desk.insist(&["lss", "set-id", &id.to_string(), "--store"]);
+        answered += usize::from(is_answered);
+        lost += usize::from(!is_answered);
         desk.power_cycle();
         desk.node = id;
         assert_eq!(desk.heartbeat(), 1000, "{}", desk.told);
