@@ -27,49 +27,60 @@ pub const fn count(all: &[&[&[Object]]]) -> usize {
 /// During compilation, if `N` is another number or there are too many parts.
 #[must_use]
 pub const fn merged<const N: usize>(all: &[&[&[Object]]]) -> [Object; N] {
-    let (mut rests, len) = flat(all);
+    let mut parts = Parts::new(all);
     let mut rows = [Object::new(0, 0, "", Type::Unsigned8, Access::Const); N];
     let mut at = 0;
     while at < N {
-        let first = lowest(&rests, len);
-        let (row, rest) = rests[first].split_first().expect("N is not the number of rows");
-        (rows[at], rests[first]) = (*row, rest);
+        rows[at] = parts.take_lowest();
         at += 1;
     }
     assert!(count(all) == N, "N is not the number of rows");
     rows
 }
 
-/// The parts in one list, and their number.
-const fn flat<'a>(all: &[&'a [&'a [Object]]]) -> ([&'a [Object]; PARTS], usize) {
-    let (mut parts, mut len, mut i): ([&[Object]; PARTS], usize, usize) = ([&[]; PARTS], 0, 0);
-    while i < all.len() {
-        let mut part = 0;
-        while part < all[i].len() {
-            parts[len] = all[i][part];
-            (len, part) = (len + 1, part + 1);
-        }
-        i += 1;
-    }
-    (parts, len)
+/// The rows of all parts that are not in the table yet.
+struct Parts<'a> {
+    rests: [&'a [Object]; PARTS],
+    /// The key of the first row of each rest; the highest number for an empty one.
+    keys: [u32; PARTS],
+    len: usize,
 }
 
-/// The part whose next row comes first; any part when no row is left.
-const fn lowest(parts: &[&[Object]; PARTS], len: usize) -> usize {
-    let (mut lowest, mut i) = (0, 0);
-    while i < len {
-        if key(parts[i]) < key(parts[lowest]) {
-            lowest = i;
+impl<'a> Parts<'a> {
+    const fn new(all: &[&'a [&'a [Object]]]) -> Parts<'a> {
+        let mut parts = Parts { rests: [&[]; PARTS], keys: [u32::MAX; PARTS], len: 0 };
+        let mut i = 0;
+        while i < all.len() {
+            let mut part = 0;
+            while part < all[i].len() {
+                parts.set(parts.len, all[i][part]);
+                (parts.len, part) = (parts.len + 1, part + 1);
+            }
+            i += 1;
         }
-        i += 1;
+        parts
     }
-    lowest
-}
 
-const fn key(rows: &[Object]) -> u32 {
-    match rows.first() {
-        Some(row) => (row.index as u32) << 8 | row.sub as u32,
-        None => u32::MAX,
+    const fn set(&mut self, part: usize, rest: &'a [Object]) {
+        self.rests[part] = rest;
+        self.keys[part] = match rest.first() {
+            Some(row) => row.key(),
+            None => u32::MAX,
+        };
+    }
+
+    /// Takes the row that comes first.
+    const fn take_lowest(&mut self) -> Object {
+        let (mut lowest, mut key, mut i) = (0, self.keys[0], 1);
+        while i < self.len {
+            if self.keys[i] < key {
+                (lowest, key) = (i, self.keys[i]);
+            }
+            i += 1;
+        }
+        let (row, rest) = self.rests[lowest].split_first().expect("N is not the number of rows");
+        self.set(lowest, rest);
+        *row
     }
 }
 

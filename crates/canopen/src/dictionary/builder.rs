@@ -127,8 +127,10 @@ impl TableBuilder {
             self.places[start + row] = Place { sub: object[row].sub, attributes, offset };
             (row, next) = (row + 1, next + object[row].stored_size() as u16);
         }
-        let mut first = 0;
-        while !self.has_places(first, start, object.len()) {
+        let (mut first, head) = (0, self.places[start]);
+        // Most places differ in the attributes.
+        while self.places[first].attributes != head.attributes || !self.has_places(first, start, object.len())
+        {
             first += 1;
         }
         self.used.places = larger(start, first + object.len());
@@ -149,8 +151,13 @@ impl TableBuilder {
     }
 
     const fn add_attributes(&mut self, attributes: Attributes) -> usize {
-        let mut number = 0;
-        while number < self.used.attributes && !is_same(&self.attributes[number], &attributes) {
+        let (mut number, kind, size) = (0, attributes.kind as u8, attributes.size);
+        while number < self.used.attributes {
+            let other = &self.attributes[number];
+            // Most differ in the type or its size.
+            if other.kind as u8 == kind && other.size == size && is_same(other, &attributes) {
+                break;
+            }
             number += 1;
         }
         self.attributes[number] = attributes;
@@ -210,14 +217,14 @@ pub(super) const fn larger(a: usize, b: usize) -> usize {
 }
 
 pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
-    a.limits.is_same(b.limits)
-        && a.kind as u8 == b.kind as u8
+    a.kind as u8 == b.kind as u8
         && a.size == b.size
-        && a.rule.code() == b.rule.code()
         && a.access as u8 == b.access as u8
         && a.mapping as u8 == b.mapping as u8
-        && group_code(a.group) == group_code(b.group)
         && a.node_relative == b.node_relative
+        && group_code(a.group) == group_code(b.group)
+        && a.rule.code() == b.rule.code()
+        && a.limits.is_same(b.limits)
 }
 
 /// Whether two rows have the same attributes. Rows of a series are equal as they are written; only then is nothing

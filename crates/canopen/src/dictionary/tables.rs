@@ -210,16 +210,19 @@ impl Dictionary {
     /// The location of a value and its kind, for use at compile time.
     #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
     pub(super) const fn location(&self, index: u16, sub: u8) -> (Field, Kind) {
-        let mut i = 0;
-        while i < self.series.len()
-            && (index < self.series[i].index || index - self.series[i].index >= self.series[i].objects as u16)
-        {
-            i += 1;
+        let (mut low, mut high) = (0, self.series.len());
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.series[middle].index <= index {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
         }
-        if i == self.series.len() {
+        if low == 0 || index - self.series[low - 1].index >= self.series[low - 1].objects as u16 {
             fail(index, sub, "no such object in the dictionary");
         }
-        let series = &self.series[i];
+        let series = &self.series[low - 1];
         let (mut place, end) = (series.first as usize, series.first as usize + series.entries as usize);
         while place < end && self.places[place].sub != sub {
             place += 1;
