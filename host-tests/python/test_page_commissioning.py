@@ -212,31 +212,42 @@ def activation_and_requests(simulator: Simulator) -> tuple[float, list[float]]:
     """The time of *activate bit timing* in the log, and the times of the uploads that are asked for after it."""
     frames = re.findall(r"\((\d+\.\d+)\) \S+ ([0-9A-F]+)#([0-9A-F]*)", simulator.log.read_text())
     (activation,) = [float(at) for at, can_id, data in frames if can_id == "7E5" and data.startswith("15")]
-    return activation, [float(at) for at, can_id, data in frames if can_id in ("601", "602") and data.startswith("40") and float(at) > activation]
+    asked = {f"{0x600 + node:X}" for node in simulator.devices}
+    return activation, [float(at) for at, can_id, data in frames if can_id in asked and data.startswith("40") and float(at) > activation]
 
 
-@pytest.mark.parametrize("master", ["page", "nodectl"])
-def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str):
+#: The LSS master, two nodes, their bit rate, the next one, and the switch delay in milliseconds.
+CHANGES = [
+    ("page", {1: "pressure", 2: "encoder"}, 500, 250, 1000),
+    ("nodectl", {3: "combined", 4: "lift"}, 125, 1000, 600),
+    ("page", {127: "lift", 64: "combined"}, 1000, 50, 1500),
+    ("nodectl", {20: "encoder", 99: "pressure"}, 50, 125, 3000),
+]
+
+
+@pytest.mark.parametrize(("master", "nodes", "rate", "new", "delay"), CHANGES)
+def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str, nodes: dict, rate: int, new: int, delay: int):
     """Nodes are silent for twice the switch delay (CiA 305)."""
-    simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
+    flags = [word for node, personality in nodes.items() for word in ("--node", f"{node}:{personality}")]
+    simulator = Simulator("--bitrate", str(rate), *flags, "--control", "127.0.0.1:0", speed="real")
     server = Server(simulator)
     page = Page(driver, server.url)
-    for node in (1, 2):
+    for node in nodes:
         page.says(f"tr[data-node='{node}']", "STM32F4")
     ask = """const ask = (node) => window.canopen.bus.request("read", { node, objects: [[0x1000, 0]] });
-        setInterval(() => [1, 2].forEach((node) => ask(node).catch(() => null)), 50);"""
+        setInterval(() => %s.forEach((node) => ask(node).catch(() => null)), 50);""" % list(nodes)
     if master == "page":
         page.script(ask)
-        page.request("lss.bit_rate", kbit=250, identity=None, store=True, activate=1000)
+        page.request("lss.bit_rate", kbit=new, identity=None, store=True, activate=delay)
     else:
         # A request of the page may not cross the command: the page cannot know of it yet.
-        assert nodectl(simulator, "lss", "--all", "set-rate", "250", "--store").returncode == 0
-        assert nodectl(simulator, "lss", "--all", "activate", "1000").returncode == 0
+        assert nodectl(simulator, "lss", "--all", "set-rate", str(new), "--store").returncode == 0
+        assert nodectl(simulator, "lss", "--all", "activate", str(delay)).returncode == 0
         page.script(ask)
     page.until(lambda: len(activation_and_requests(simulator)[1]) > 4, "ask again after the change")
     page.leave()
     server.stop()
     simulator.quit()
     activation, requests = activation_and_requests(simulator)
-    # The page waits two seconds by the clock of the host. A simulator on a busy machine is behind that clock.
-    assert requests[0] > activation + 0.5, f"asked at {requests[0]}, the change began at {activation}"
+    # The page waits twice the delay by the clock of the host. A simulator on a busy machine is behind that clock.
+    assert requests[0] > activation + delay / 2000, f"asked at {requests[0]}, the change began at {activation}"
