@@ -5,9 +5,10 @@ use fastrand::Rng;
 use host_tests::thorough::either;
 use host_tests::watch::expects;
 use monitor::Rule;
+use sim::world::World;
 
 use super::bench::{version_a, version_b};
-use super::fleet::{PERSONALITIES, Shared, share, update_while};
+use super::fleet::{Outage, PERSONALITIES, Shared, share, update_while};
 use crate::broken_line::noise;
 use crate::support::world;
 
@@ -44,5 +45,41 @@ fn nodectl_completes_an_update_over_a_line_that_breaks_at_any_time() {
             summary.nodes[0].incidents.iter().all(|incident| incident.ends_with("reset by software"));
         assert!(is_clean, "{told}: {summary}");
         assert!(summary.bus.errors > 0, "{told}: {summary}");
+    }
+}
+
+/// A line that breaks, and one of the two nodes loses its power too: before, within or after the noise.
+#[test]
+fn nodectl_completes_the_update_of_two_nodes_of_which_one_loses_its_power() {
+    let _expected = expects([Rule::HeartbeatLate]);
+    let mut rng = Rng::with_seed(7);
+    let image = version_b(0);
+    let words = image.to_bytes().len() as u64 / 4;
+    for case in 0..either(2, 32) {
+        let nodes = [[1, 2], [16, 127], [33, 34]][case % 3];
+        let personalities = [PERSONALITIES[case % 4], PERSONALITIES[(case + 1 + case / 4) % 4]];
+        let kbit = [1000, 500][case % 2];
+        let [first, second] = [0, 1].map(|node| format!("--node {}:{}", nodes[node], personalities[node]));
+        let world: Shared = share(world(&format!("--bitrate {kbit} {first} {second}")));
+        let begin = world.borrow().now() + Time::from_millis(rng.u64(..2 * latest(kbit)));
+        // The download, the copy that keeps the old program, and the copy of the new one.
+        let mut outage = Some(Outage::after(&world, case / 2 % 2, rng.u64(..3 * words)));
+        let mut noise = noise(begin, NOISE);
+        let happens = move |world: &mut World| {
+            noise(world);
+            outage.take_if(|outage| outage.is_over(world));
+        };
+        let result = update_while(&world, &format!("{},{}", nodes[0], nodes[1]), &image, happens, &[]);
+        let told =
+            format!("case {case}, {first} {second}, {kbit} kbit/s, noise from {:.3} s", begin.as_secs_f64());
+        let reports = result.unwrap_or_else(|error| panic!("{told}: {error}"));
+        for node in nodes {
+            let report = reports.iter().find(|report| report["node"] == node);
+            let report = report.unwrap_or_else(|| panic!("{told}: no report of {node}: {reports:?}"));
+            assert_eq!(report["result"], "updated", "{told}: {reports:?}");
+            assert_eq!(report["new_identification"], image.header.code_crc(), "{told}");
+            assert_eq!(report["on_trial"], false, "{told}");
+        }
+        println!("{told}: {:.1} s", world.borrow().now().as_secs_f64());
     }
 }

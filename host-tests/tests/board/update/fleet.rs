@@ -32,13 +32,17 @@ impl Outage {
 
     /// A failure halfway through the flash operations of an image's download.
     fn halfway(world: &Shared, board: usize, image: &Image) -> Outage {
-        let words = image.to_bytes().len() as u64 / 4;
+        Outage::after(world, board, image.to_bytes().len() as u64 / 8)
+    }
+
+    /// A failure after this number of flash operations.
+    pub(super) fn after(world: &Shared, board: usize, operations: u64) -> Outage {
         let done = world.borrow_mut().machine(board).peripherals_mut().flash_mut().operations();
-        Outage { board, operation: done + words / 2, until: None }
+        Outage { board, operation: done + operations, until: None }
     }
 
     /// Whether the power has returned.
-    fn is_over(&mut self, world: &mut World) -> bool {
+    pub(super) fn is_over(&mut self, world: &mut World) -> bool {
         let now = world.now();
         let machine = world.machine(self.board);
         match self.until {
