@@ -16,8 +16,7 @@ use update::{Authorisation, Trial};
 
 use crate::bit_rate::Rate;
 
-/// Without a stored value: node-ID 1, pressure, the bit rate of the bus. A setting that is stored later keeps the
-/// detection: the rate of the bus is not that of the node.
+/// Without a stored value: node-ID 1, pressure, the bit rate of the bus.
 const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
 const DEFAULT_BIT_RATE: BitRate = BitRate::AUTO;
 const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);

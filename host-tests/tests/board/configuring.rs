@@ -216,8 +216,7 @@ fn select(world: &mut World, master: &Master) {
     }
 }
 
-/// The rate of the bus is not stored with another setting, and no other rate is: the node would disturb the bus after its
-/// next start.
+/// With another rate the node would disturb the bus after its next start.
 #[test]
 fn a_new_board_that_stores_a_setting_keeps_the_bit_rate_of_the_bus() {
     for rate in [1000, 500, 125, 50] {

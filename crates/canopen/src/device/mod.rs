@@ -89,8 +89,13 @@ impl<D: Definition> Device<D> {
     /// Sets the configured bit rate. LSS stores it together with a new node-ID.
     #[must_use]
     pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Device<D> {
-        self.services.set_bit_rate(bit_rate);
+        self.set_bit_rate(bit_rate);
         self
+    }
+
+    /// As [`with_bit_rate`](Device::with_bit_rate), for a caller that has detected the bit rate and keeps it.
+    pub fn set_bit_rate(&mut self, bit_rate: BitRate) {
+        self.services.set_bit_rate(bit_rate);
     }
 
     /// Reports the bit rate at which the bus runs. PDOs take at most three quarters of it, so that the heartbeat, EMCY and

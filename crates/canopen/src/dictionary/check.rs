@@ -94,7 +94,11 @@ const fn check_can_id(row: &Object) {
     let is_free = is_off || !first.id.is_restricted() && !last.id.is_restricted();
     require!(is_free, row, "the CAN-ID is reserved for another service");
     let is_producer = matches!(row.rule, Rule::SyncCobId) && first.bit30;
-    require!(!is_producer, row, "the rows are those of a consumer of SYNC, and the default makes it a producer");
+    require!(
+        !is_producer,
+        row,
+        "the rows are those of a consumer of SYNC, and the default makes it a producer"
+    );
 }
 
 const fn check_default(row: &Object) {
