@@ -89,7 +89,7 @@ impl<D: Definition> Device<D> {
     /// Sets the configured bit rate. LSS stores it together with a new node-ID.
     #[must_use]
     pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Device<D> {
-        self.set_bit_rate(bit_rate);
+        self.services.set_bit_rate(bit_rate);
         self
     }
 

@@ -43,6 +43,9 @@ impl<D: Definition> Services<D> {
         }
     }
 
+    // Inlined: a new device that is moved by a builder is otherwise copied on the stack.
+    #[allow(clippy::inline_always)] // The copy takes 12 KB.
+    #[inline(always)]
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
         self.lss.set_bit_rate(bit_rate);
         self.set_bus_bit_rate(bit_rate);
