@@ -17,7 +17,16 @@ pub(crate) enum Rate {
     /// No rate is stored: the node waits on a silent bus at the default rate, and searches on any other bus.
     Missing,
     /// The search is in progress.
-    Searched(Guest),
+    Searched(Guest, Origin),
+}
+
+/// Why a bit rate is searched.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// Automatic detection is configured.
+    Configured,
+    /// No rate is stored: the found one is that of the node.
+    Missing,
 }
 
 impl Rate {
@@ -32,35 +41,41 @@ impl Rate {
     /// Starts the search.
     pub(crate) fn search(&mut self, can: &mut Controller, frames: &mut Frames, now: Instant) {
         defmt::info!("looking for the bit rate");
-        let (guest, step) = match self {
-            Rate::Missing => Guest::new(None),
-            _ => Guest::searching(now),
+        let ((guest, step), origin) = match self {
+            Rate::Missing => (Guest::new(None), Origin::Missing),
+            _ => (Guest::searching(now), Origin::Configured),
         };
         if let Step::Listen(timing) = step {
             can.listen(timing);
         }
         drop_all(frames);
-        *self = Rate::Searched(guest);
+        *self = Rate::Searched(guest, origin);
     }
 
-    /// Continues a search in progress. True when the search has ended. Takes all frames.
+    /// Continues a search in progress. Returns its origin when it has ended. Takes all frames.
     ///
     /// A frame counts for the rate at which the controller received it. The controller changes its rate at the end of
     /// the frame that is on the bus, so the last frame at a rate may arrive after the change was requested.
-    pub(crate) fn go_on(&mut self, can: &mut Controller, frames: &mut Frames, now: Instant) -> bool {
-        let Rate::Searched(guest) = self else { return false };
+    pub(crate) fn go_on(
+        &mut self,
+        can: &mut Controller,
+        frames: &mut Frames,
+        now: Instant,
+    ) -> Option<Origin> {
+        let Rate::Searched(guest, origin) = self else { return None };
+        let origin = *origin;
         let heard = if frames.dequeue().is_some() { Heard::Frame } else { can.heard() };
         match guest.step(heard, now) {
-            Step::Stay => return false,
+            Step::Stay => return None,
             Step::Listen(timing) => can.listen(timing),
             Step::Found(timing) => *self = Rate::Known(timing),
         }
         drop_all(frames);
-        matches!(self, Rate::Known(_))
+        matches!(self, Rate::Known(_)).then_some(origin)
     }
 
     pub(crate) fn is_searched(&self) -> bool {
-        matches!(self, Rate::Searched(_))
+        matches!(self, Rate::Searched(..))
     }
 }
 

@@ -16,9 +16,9 @@ use update::{Authorisation, Trial};
 
 use crate::bit_rate::Rate;
 
-/// Defaults without a stored value: node-ID 1, pressure, the detected bit rate or 250 kbit/s.
+/// Without a stored value: node-ID 1, pressure, the bit rate of the bus.
 const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
-const DEFAULT_BIT_RATE: u16 = 250;
+const DEFAULT_BIT_RATE: BitRate = BitRate::AUTO;
 const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);
 
 /// The node with its stored data.
@@ -100,11 +100,10 @@ fn reason<E>(error: &Error<E>) -> &'static str {
 
 fn setup(record: Option<DeviceRecord>) -> Setup {
     let stored_rate = record.and_then(|record| BitRate::from_kbit(record.bit_rate_kbit()));
-    let default_rate = BitRate::from_kbit(DEFAULT_BIT_RATE).unwrap_or(BitRate::FASTEST);
     Setup {
         personality: record.map_or(Personality::default(), |record| personality(record.personality())),
         node_id: record.map_or(DEFAULT_NODE_ID, |record| NodeId::new(record.node_id())),
-        bit_rate: stored_rate.unwrap_or(default_rate),
+        bit_rate: stored_rate.unwrap_or(DEFAULT_BIT_RATE),
         serial_number: factory::serial_number(),
         program_id: memory::program_id(),
         hardware_version: BOARD.name,

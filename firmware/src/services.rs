@@ -15,7 +15,7 @@ use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
 use node::{Action, BitRate, BusEvent, Fault, Next, NodeId, Parameters, Protocol, State};
 
-use crate::bit_rate::Rate;
+use crate::bit_rate::{Origin, Rate};
 use crate::bus::event_of;
 use crate::shared::Shared;
 use crate::{PROCESS, STORAGE};
@@ -179,8 +179,12 @@ impl Services {
 
     /// Continues the detection of the bit rate, and returns to the bus when it is found.
     fn search(&mut self, node: &mut impl Shared) {
-        if !self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) {
-            return;
+        let Some(origin) = self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) else { return };
+        if origin == Origin::Missing
+            && let Rate::Known(timing) = self.rate
+            && let Some(bit_rate) = BitRate::from_kbit(timing.kbit())
+        {
+            node.call(|protocol, _| protocol.adopt_bit_rate(bit_rate));
         }
         // LSS may have activated the detection in a node that is already running: it keeps its state and its values.
         if node.call(|protocol, _| protocol.state() == State::Initialising) {

@@ -64,12 +64,14 @@ impl Consumer {
     pub(crate) fn configure(&mut self, settings: Settings) {
         self.id = CobId::parse(settings.cob_id).map_or(self.id, |cob_id| cob_id.id);
         self.settings = settings;
+        self.is_missing = false;
         self.stop();
     }
 
-    /// After a change of the NMT state: period and window begin again with the next SYNC.
+    /// After a change of the NMT state: period and window begin again with the next SYNC, which ends the fault of a missing
+    /// one.
     pub(crate) fn stop(&mut self) {
-        (self.due, self.window_end, self.is_missing) = (Tick::NEVER, Tick::NEVER, false);
+        (self.due, self.window_end) = (Tick::NEVER, Tick::NEVER);
     }
 
     pub(crate) fn id(&self) -> CanId {

@@ -1,7 +1,7 @@
 //! The device record in the parameter store: personality, node-ID and bit rate of the next start.
 
 use crate::Setup;
-use canopen::lss::Configuration;
+use canopen::lss::{BitRate, Configuration};
 use canopen::{Job, NodeId};
 use profiles::Personality;
 use storage::DeviceRecord;
@@ -18,6 +18,10 @@ impl Configured {
     pub(crate) fn of(setup: &Setup) -> Configured {
         let lss = Configuration { node_id: setup.node_id, bit_rate: setup.bit_rate };
         Configured { lss, personality: setup.personality }
+    }
+
+    pub(crate) fn set_bit_rate(&mut self, bit_rate: BitRate) {
+        self.lss.bit_rate = bit_rate;
     }
 
     /// The configuration after a job.

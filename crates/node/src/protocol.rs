@@ -63,6 +63,13 @@ impl Protocol {
         self.device.set_bus_bit_rate(bit_rate);
     }
 
+    /// Takes a detected bit rate as the configured one, for a node without a stored rate: LSS and a new personality store
+    /// it with the other values of the device record.
+    pub fn adopt_bit_rate(&mut self, bit_rate: BitRate) {
+        self.device.set_bit_rate(bit_rate);
+        self.device.application_mut().configured.set_bit_rate(bit_rate);
+    }
+
     /// The node-ID in use; `None` while the node waits for LSS to assign one.
     #[must_use]
     pub fn node_id(&self) -> Option<NodeId> {

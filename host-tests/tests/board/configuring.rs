@@ -182,6 +182,81 @@ fn a_node_detects_the_bit_rate_without_disturbing_the_bus() {
     }
 }
 
+/// A board without a device record beside a node of this bit rate, after it has detected the rate.
+fn new_board(rate: u32) -> (World, Master) {
+    const PAGES: u32 = 0x0800_8000;
+    const SIZE: usize = 0x8000;
+    let mut world = world(&format!("--bitrate {rate} --node 1:pressure --node 9:lift"));
+    let master = Master::join_at(&mut world, rate * 1000);
+    world.machine(0).write(PAGES, &[0xFF; SIZE]).unwrap();
+    world.machine(0).power_off();
+    world.machine(0).power_on(Time::from_millis(1));
+    assert!(boots(&mut world, &master, 1), "{rate} kbit/s");
+    (world, master)
+}
+
+/// Sends frames until a node boots up. Returns whether it does within ten seconds.
+fn boots(world: &mut World, master: &Master, node: u8) -> bool {
+    let before = world.traffic().node(node).boot_ups;
+    (0..200).any(|_| {
+        let next = world.now() + ms(50);
+        world.run_until(next);
+        master.send(world, 0x77F, &[5]);
+        world.traffic().node(node).boot_ups > before
+    })
+}
+
+/// Selects the pressure node alone for LSS, by its identity.
+fn select(world: &mut World, master: &Master) {
+    for part in 1..=4_u8 {
+        let value = master.ask(world, 1, &[0x40, 0x18, 0x10, part, 0, 0, 0, 0])[4..].to_vec();
+        let request = [0x3F + part, value[0], value[1], value[2], value[3], 0, 0, 0];
+        master.send(world, LSS_REQUEST, &request);
+        world.run_until(world.now() + ms(50));
+    }
+}
+
+/// With another rate the node would disturb the bus after its next start.
+#[test]
+fn a_new_board_that_stores_a_setting_keeps_the_bit_rate_of_the_bus() {
+    for rate in [1000, 500, 125, 50] {
+        let (mut world, master) = new_board(rate);
+        assert_eq!(write(&mut world, &master, 0x2000, 0, &[1])[0], 0x60, "{rate} kbit/s");
+        master.send(&mut world, 0, &[0x81, 1]);
+        assert!(boots(&mut world, &master, 1), "{rate} kbit/s, personality");
+        assert_eq!(device_type(&mut world, &master), [0x96, 1, 5, 0], "{rate} kbit/s");
+        select(&mut world, &master);
+        for request in [[0x11, 40], [0x17, 0]] {
+            let answers = master.lss(&mut world, &[request[0], request[1], 0, 0, 0, 0, 0, 0]);
+            assert_eq!(answers[0][..2], [request[0], 0], "{rate} kbit/s");
+        }
+        master.send(&mut world, LSS_REQUEST, &[0x04, 0, 0, 0, 0, 0, 0, 0]);
+        world.run_until(world.now() + SECOND);
+        let now = world.now();
+        world.machine(0).power_off();
+        world.machine(0).power_on(now);
+        assert!(boots(&mut world, &master, 40), "{rate} kbit/s, node-ID");
+        assert_eq!(run(&mut world, SECOND).bus.errors, 0, "{rate} kbit/s");
+    }
+}
+
+/// Without *configure bit timing* the active bit timing stays (CiA 305).
+#[test]
+fn a_new_board_that_activates_no_bit_rate_keeps_that_of_the_bus() {
+    for rate in [1000, 500, 125, 50] {
+        let (mut world, master) = new_board(rate);
+        select(&mut world, &master);
+        master.send(&mut world, LSS_REQUEST, &[0x15, 100, 0, 0, 0, 0, 0, 0]);
+        world.run_until(world.now() + ms(300));
+        for _ in 0..100 {
+            world.run_until(world.now() + ms(50));
+            master.send(&mut world, 0x77F, &[5]);
+        }
+        assert_eq!(device_type(&mut world, &master), [0x94, 1, 2, 0], "{rate} kbit/s");
+        assert_eq!(run(&mut world, SECOND).bus.errors, 0, "{rate} kbit/s");
+    }
+}
+
 /// A frame that ends while the node moves on to the next rate was received at the previous rate. The test sends long
 /// frames at every phase. The node may miss some of them, but must never take one for a frame at another rate, because
 /// it would then destroy frames on the bus.

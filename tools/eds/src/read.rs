@@ -156,14 +156,17 @@ fn object_type(section: Section) -> ObjectType {
 fn entry(section: Section, index: u16, sub: u8) -> Entry {
     let data_type = data_type(section);
     let is_of_object = !section.name().contains("sub");
+    let value = formula(section, "ParameterValue", data_type);
+    // Without the value that its author meant, an entry has none: the default would be another one.
+    let is_damaged = value.is_none() && section.get("ParameterValue").is_some();
     Entry {
         index,
         sub,
         name: name(section, index, (!is_of_object).then_some(sub)),
         data_type,
         access: access(section),
-        default: formula(section, "DefaultValue", data_type),
-        value: formula(section, "ParameterValue", data_type),
+        default: formula(section, "DefaultValue", data_type).filter(|_| !is_damaged),
+        value,
         low: formula(section, "LowLimit", data_type),
         high: formula(section, "HighLimit", data_type),
         mappable: flag(section, "PDOMapping"),

@@ -185,6 +185,20 @@ fn a_mistake_of_a_vendor_is_a_warning_and_the_rest_is_read() {
     }
 }
 
+/// A configuration with such an entry would write the default, which its author did not ask for.
+#[test]
+fn an_entry_whose_value_cannot_be_read_has_no_value() {
+    for (line, value) in
+        [("ParameterValue=7x0", None), ("ParameterValue=70000", None), ("ParameterValue=", integer(5))]
+    {
+        let text = format!("[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\n{line}");
+        let eds = Eds::parse(&text).unwrap();
+        let entry = get(&eds, 0x2001, 0);
+        assert_eq!(entry.value.clone().or(entry.default.clone()), value, "{line}");
+        assert_eq!(eds.warnings.len(), usize::from(value.is_none()), "{line}: {:?}", eds.warnings);
+    }
+}
+
 #[test]
 fn a_missing_key_is_replaced_with_a_warning() {
     let cases = [

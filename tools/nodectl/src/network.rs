@@ -220,12 +220,15 @@ impl Network {
             let Some(received) = self.fetch(self.now())? else { break };
             self.keep(received);
         }
-        let pause_until = self.now() + WITHOUT_PAUSE;
+        let begin = self.now();
+        let pause_until = begin + WITHOUT_PAUSE;
         loop {
             let now = self.now();
             let left = self.others.quiet(node, now).map_or(0, |quiet| PAUSE.0.saturating_sub(quiet.0));
             let is_busy = self.others.is_busy(node, now);
-            if !is_busy && (left == 0 || now >= pause_until) {
+            // Without an answer, the frames may be the segments of a block whose begin was not heard.
+            let has_waited = now >= pause_until && self.others.has_answered_since(node, begin);
+            if !is_busy && (left == 0 || has_waited) {
                 return Ok(true);
             }
             if now >= deadline {

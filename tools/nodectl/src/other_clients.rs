@@ -51,7 +51,22 @@ struct Servers {
 struct Heard {
     request: Instant,
     frame: Instant,
+    answer: Instant,
+    block: Block,
 }
+
+/// A block transfer whose begin was not heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Block {
+    None,
+    /// The server has acknowledged a block.
+    Download,
+    /// The client has acknowledged a block.
+    Upload,
+}
+
+/// The acknowledge of a block, by the server or by the client (CiA 301, 7.2.4.3).
+const ACKNOWLEDGE: u8 = 0xA2;
 
 impl OtherClients {
     /// Takes a frame from the bus. Returns the transfer that the frame has ended.
@@ -98,6 +113,12 @@ impl OtherClients {
         Some(Duration(now.0.saturating_sub(heard.frame.0)))
     }
 
+    /// Whether the server of that channel has sent a frame to another client since an instant: a client that sends the
+    /// segments of a block without a pause lets no other in.
+    pub(crate) fn has_answered_since(&self, node: NodeId, begin: Instant) -> bool {
+        self.servers(node).heard.get(&node).is_some_and(|heard| heard.answer >= begin)
+    }
+
     /// The time since the newest request of another client to a node; `None` where there was none.
     pub(crate) fn since_request(&self, node: NodeId, now: Instant) -> Option<Duration> {
         let heard = self.default.heard.get(&node)?;
@@ -112,18 +133,37 @@ impl OtherClients {
 impl Servers {
     fn on_frame(&mut self, node: NodeId, frame: &Frame, now: Instant) -> Option<(NodeId, Transferred)> {
         let is_request = frame.id() >= 0x600;
+        let is_acknowledge = frame.data().first() == Some(&ACKNOWLEDGE);
         if is_request {
-            self.heard.insert(node, Heard { request: now, frame: now });
-        } else if self.transfers.has(node) {
-            self.heard.entry(node).and_modify(|heard| heard.frame = now);
+            let before = self.heard.get(&node).map_or(Block::None, |heard| heard.block);
+            let block = match before {
+                _ if is_acknowledge => Block::Upload,
+                Block::Upload => Block::None,
+                before => before,
+            };
+            let answer = self.heard.get(&node).map_or(Instant(0), |heard| heard.answer);
+            self.heard.insert(node, Heard { request: now, frame: now, answer, block });
+        } else if let Some(heard) = self.heard.get_mut(&node) {
+            heard.answer = now;
+            heard.block = match heard.block {
+                _ if is_acknowledge => Block::Download,
+                Block::Download => Block::None,
+                before => before,
+            };
+            if self.transfers.has(node) {
+                heard.frame = now;
+            }
         }
         let ended = self.transfers.on_frame(node, frame, now);
         ended.into_iter().next_back().map(|ended| (node, ended))
     }
 
     fn is_busy(&self, node: NodeId, now: Instant) -> bool {
-        let is_recent = |heard: &Heard| now.0.saturating_sub(heard.frame.0) < GIVEN_UP.0;
-        self.transfers.has(node) && self.heard.get(&node).is_some_and(is_recent)
+        let is_recent = |at: Instant| now.0.saturating_sub(at.0) < GIVEN_UP.0;
+        let Some(heard) = self.heard.get(&node) else { return false };
+        // The answers to this program are heard too, so only the requests of another client keep its block alive.
+        let is_in_block = heard.block != Block::None && is_recent(heard.request);
+        is_in_block || self.transfers.has(node) && is_recent(heard.frame)
     }
 }
 
@@ -180,6 +220,27 @@ mod tests {
         others.on_frame(&frame(0x605, READ), Instant(0));
         assert!(others.on_frame(&frame(0x585, [0x43, 0x17, 0x10, 0, 1, 0, 0, 0]), Instant(1)).is_none());
         assert!(others.is_busy(node(), Instant(2)));
+    }
+
+    /// A client that comes in the middle of a transfer has not heard its begin.
+    #[test]
+    fn a_block_transfer_whose_begin_was_not_heard_is_busy_until_its_end() {
+        let segment = [5, 1, 2, 3, 4, 5, 6, 7];
+        let acknowledge = [0xA2, 127, 127, 0, 0, 0, 0, 0];
+        let mut others = OtherClients::default();
+        others.on_frame(&frame(0x605, segment), Instant(0));
+        others.on_frame(&frame(0x585, acknowledge), Instant(10));
+        assert!(others.is_busy(node(), Instant(20)) && others.has_answered_since(node(), Instant(10)));
+        others.on_frame(&frame(0x605, segment), Instant(30));
+        assert!(others.is_busy(node(), Instant(40)) && !others.has_answered_since(node(), Instant(40)));
+        others.on_frame(&frame(0x585, [0xA1, 0, 0, 0, 0, 0, 0, 0]), Instant(50));
+        assert!(!others.is_busy(node(), Instant(60)));
+        others.on_frame(&frame(0x605, acknowledge), Instant(70));
+        assert!(others.is_busy(node(), Instant(80)));
+        others.on_frame(&frame(0x605, [0xA1, 0, 0, 0, 0, 0, 0, 0]), Instant(90));
+        assert!(!others.is_busy(node(), Instant(100)));
+        others.on_frame(&frame(0x605, acknowledge), Instant(110));
+        assert!(!others.is_busy(node(), Instant(110 + GIVEN_UP.0)));
     }
 
     #[test]

@@ -130,7 +130,7 @@ impl<D: Definition> Inner<D> {
     /// Whether the device has process data, or sends or receives SYNCs or time stamps.
     pub(super) const fn has_process() -> bool {
         let pdos = Self::has(Services::TPDO) || Self::has(Services::RPDO);
-        pdos || Self::has(Services::SYNC_PRODUCER) || Self::has(Services::TIME)
+        pdos || Self::has(Services::SYNC) || Self::has(Services::SYNC_PRODUCER) || Self::has(Services::TIME)
     }
 
     pub(super) fn is_initialising(&self) -> bool {

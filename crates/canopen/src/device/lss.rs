@@ -125,16 +125,18 @@ impl LssSlave {
         }
     }
 
-    /// Continues a change of the bit rate. Frames that were held back are sent after the change.
-    /// Returns the new bit rate when the bus changes to it.
+    /// When the present delay of a change of the bit rate is over.
+    pub(super) fn switching_due(&self) -> Tick {
+        self.switching_due
+    }
+
+    /// Continues a change of the bit rate, at [`switching_due`](LssSlave::switching_due). Frames that were held back are
+    /// sent after the change. Returns the new bit rate when the bus changes to it.
     pub(super) fn poll_switching(
         &mut self,
         now: Tick,
         inner: &mut Inner<impl Definition>,
     ) -> Option<BitRate> {
-        if now < self.switching_due {
-            return None;
-        }
         let Switching::Before(switch) = self.switching else {
             (self.switching, self.switching_due) = (Switching::No, Tick::NEVER);
             return None;

@@ -93,6 +93,11 @@ impl<D: Definition> Device<D> {
         self
     }
 
+    /// As [`with_bit_rate`](Device::with_bit_rate), for a caller that has detected the bit rate and keeps it.
+    pub fn set_bit_rate(&mut self, bit_rate: BitRate) {
+        self.services.set_bit_rate(bit_rate);
+    }
+
     /// Reports the bit rate at which the bus runs. PDOs take at most three quarters of it, so that the heartbeat, EMCY and
     /// SDO always have room. [`with_bit_rate`](Device::with_bit_rate) and a change by LSS set it too; a caller that detects
     /// the bit rate sets it here.

@@ -65,9 +65,7 @@ impl<D: Definition> Device<D> {
     #[must_use]
     pub fn sdo_client(&self, number: u8) -> Option<sdo::Channel> {
         let inner = &self.inner;
-        let is_on = Inner::<D>::has(Services::SDO_CLIENT)
-            && inner.state.has_services()
-            && !inner.heartbeat.boots_up();
+        let is_on = Inner::<D>::has(Services::SDO_CLIENT) && inner.state.has_services();
         let index = CLIENTS + u16::from(number.checked_sub(1)?).min(MOST_CLIENTS);
         let (to_server, from_server) = inner.channel_ids(index).filter(|_| is_on)?;
         Some(sdo::Channel { to_server, from_server })

@@ -10,7 +10,7 @@ use crate::lss::BitRate;
 /// frame. Of two callers, one for process data and one for services, each sleeps until the deadline of its own half,
 /// and wakes the other caller when the other deadline has passed.
 ///
-/// Only `start`, `on_service_frame` and `poll_services` (and so `on_frame` and `poll`) return actions and parameters.
+/// Only `start`, `on_service_frame`, `poll_services` and `nmt` (and so `on_frame` and `poll`) return actions and parameters.
 /// If something waits after another call, the services are due at once.
 #[must_use = "the deadlines have moved, and an action may be left to the caller"]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

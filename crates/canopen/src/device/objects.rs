@@ -208,7 +208,12 @@ impl<D: Definition> Inner<D> {
     /// Hands a new value to the protocol that uses it, or carries out a command.
     fn apply(&mut self, entry: &Entry, value: u32, now: Tick) {
         match entry.rule() {
-            Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
+            Rule::HeartbeatTime => {
+                self.heartbeat.set_period(low_half(value), now);
+                if Self::has(Services::GUARDING) {
+                    self.configure_guarding(now);
+                }
+            }
             Rule::ErrorCount if Self::has(Services::EMCY) => self.emcy.clear_history(),
             Rule::TimeCobId if Self::has(Services::TIME) => self.configure_time(),
             Rule::GuardTime | Rule::LifeTimeFactor if Self::has(Services::GUARDING) => {

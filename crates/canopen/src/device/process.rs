@@ -118,10 +118,14 @@ impl<D: Definition> Device<D> {
     }
 
     /// Writes a value for the application, with the checks and effects of a value received by PDO. Returns whether the
-    /// object accepts it. To be called before [`publish`](Device::publish), which gives the deadlines that follow.
+    /// object accepts it: a value of its length, in an object that has a place in the image and is no command. To be called
+    /// before [`publish`](Device::publish), which gives the deadlines that follow.
     pub fn write_value(&mut self, at: Multiplexer, bytes: &[u8]) -> bool {
-        let entry = self.inner.dictionary.find(at.index, at.sub);
-        entry.is_ok_and(|entry| self.inner.store_process_value(&entry, bytes))
+        let Ok(entry) = self.inner.dictionary.find(at.index, at.sub) else { return false };
+        let is_value = !entry.rule().is_computed() && !entry.rule().is_command();
+        is_value
+            && bytes.len() == usize::from(entry.field().size)
+            && self.inner.store_process_value(&entry, bytes)
     }
 
     /// Sends a TPDO of type 254 or 255 for an event of the application, now or when its inhibit time is over. `tpdo` is

@@ -7,6 +7,7 @@ use crate::array::Array;
 use crate::dictionary::Services as Has;
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
+use crate::nmt::State;
 use crate::pdo::Budget;
 use crate::sdo::{Abort, Channel};
 use crate::transmit::Context;
@@ -42,6 +43,9 @@ impl<D: Definition> Services<D> {
         }
     }
 
+    // Inlined: a new device that is moved by a builder is otherwise copied on the stack.
+    #[allow(clippy::inline_always)] // The copy takes 12 KB.
+    #[inline(always)]
     pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
         self.lss.set_bit_rate(bit_rate);
         self.set_bus_bit_rate(bit_rate);
@@ -269,28 +273,28 @@ impl<D: Definition> Device<D> {
 
     #[inline(never)]
     fn send_services(&mut self, now: Tick, out: &mut impl Transmit) {
-        if D::Application::LSS
-            && let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner)
-        {
-            self.services.set_bus_bit_rate(bit_rate);
+        // Both changes of a delay of 0 are due at once.
+        while D::Application::LSS && now >= self.services.lss.switching_due() {
+            if let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner) {
+                self.services.set_bus_bit_rate(bit_rate);
+            }
         }
         let context = &mut self.services.context(now, out);
         if D::Application::LSS {
             self.services.lss.poll(context);
         }
+        let id = self.inner.service(ERROR_CONTROL);
+        // Nothing precedes the boot-up message: the device is Initialising until the message is sent.
+        if self.inner.heartbeat.boots_up() {
+            self.inner.heartbeat.poll(id, State::Initialising, context);
+            if !self.inner.heartbeat.boots_up() {
+                self.inner.enter(State::PreOperational);
+            }
+        }
         if !self.inner.is_initialising() {
-            // Nothing precedes the boot-up message. Any other heartbeat follows the EMCY that gives the reason for a new
-            // state.
-            let boots_up = self.inner.heartbeat.boots_up();
-            if !boots_up {
-                self.inner.poll_errors(context);
-            }
-            let inner = &mut self.inner;
-            let id = inner.service(ERROR_CONTROL);
-            inner.heartbeat.poll(id, inner.state, context);
-            if boots_up {
-                self.inner.poll_errors(context);
-            }
+            // A heartbeat follows the EMCY that gives the reason for a new state.
+            self.inner.poll_errors(context);
+            self.inner.heartbeat.poll(id, self.inner.state, context);
             self.silence_services();
         }
         if self.inner.state.has_services() {
@@ -308,7 +312,7 @@ impl<D: Definition> Device<D> {
         let (services, inner) = (&self.services, &self.inner);
         let lss = if D::Application::LSS { services.lss.due() } else { Tick::NEVER };
         if inner.is_initialising() {
-            return lss;
+            return if inner.heartbeat.boots_up() { lss.min(inner.heartbeat.due()) } else { lss };
         }
         let due = lss.min(inner.heartbeat.due()).min(self.inner.errors_due());
         // In a state without SDO there is no transfer, and none of these deadlines is set.

@@ -3,11 +3,11 @@
 use super::Definition;
 use super::inner::Inner;
 use super::pdos::low_half;
-use super::{Action, Application, Device, Next};
+use super::{Action, Application, Device, Next, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
 use crate::pdo::ProcessContext;
-use crate::{Instant, NodeId, Transmit};
+use crate::{Instant, NodeId, Transmit, heartbeat};
 
 /// 1F80h: the only supported value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
@@ -127,12 +127,13 @@ impl<D: Definition> Device<D> {
         self.inner.enter(State::Initialising);
         self.inner.node_id = node_id;
         self.load();
+        let inner = &mut self.inner;
+        inner.heartbeat = heartbeat::Producer::new();
         if node_id.is_some() {
-            self.inner.configure(now);
-            let inner = &mut self.inner;
+            inner.configure(now);
             inner.heartbeat.boot_up(low_half(inner.number(0x1017, 0)), now);
-            self.inner.enter(State::PreOperational);
         }
+        inner.services_due = STALE;
         self.send_due_services(now, out);
         self.next()
     }
@@ -206,6 +207,9 @@ impl<D: Definition> Inner<D> {
     /// Starts the device with its first values, if 1F80h asks for it. A device with an error does not start. Neither
     /// does a device that has already received an NMT command: the command has cleared the request.
     pub(super) fn self_start(&mut self, context: &mut ProcessContext<'_, impl Transmit, Self>) {
+        if !self.state.has_services() {
+            return;
+        }
         let next_state = &mut self.pending.next_state;
         if next_state.take_if(|state| *state == State::Operational).is_some() && self.emcy.register() == 0 {
             self.enter(State::Operational);

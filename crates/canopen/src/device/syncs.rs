@@ -37,14 +37,14 @@ impl<D: Definition> Inner<D> {
         self.process_due = STALE;
     }
 
-    /// Sends the SYNC that is due, and reacts to it as to the SYNC of another node. Nothing precedes the boot-up message.
+    /// Sends the SYNC that is due, and reacts to it as to the SYNC of another node.
     #[inline(never)]
     pub(super) fn produce_sync(&mut self, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         if context.now < self.sync_producer.due() {
             return;
         }
         let frame = self.sync_producer.frame();
-        if self.heartbeat.boots_up() || !context.send(frame) {
+        if !context.send(frame) {
             return self.sync_producer.wait_until(context.now.plus(RETRY));
         }
         self.sync_producer.sent(context.now);

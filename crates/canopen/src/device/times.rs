@@ -22,7 +22,7 @@ impl<D: Definition> Inner<D> {
 
     /// The frame with a time, if the device may send it now.
     pub(super) fn time_frame(&self, time: TimeOfDay) -> Option<Frame> {
-        let may_send = self.state.has_services() && !self.heartbeat.boots_up();
+        let may_send = self.state.has_services();
         self.time_stamp.frame(time).filter(|_| may_send)
     }
 }

@@ -32,7 +32,7 @@ impl<D: Definition> Inner<D> {
     #[inline(never)]
     pub(super) fn on_guard(&mut self, frame: &Frame, context: &mut Context<'_, impl Transmit>) {
         let id = self.service(ERROR_CONTROL);
-        let is_guarded = !self.is_initialising() && !self.heartbeat.boots_up() && !self.heartbeat.is_on();
+        let is_guarded = !self.is_initialising() && !self.heartbeat.is_on();
         if !frame.is_remote() || frame.id() != id.get() || !is_guarded {
             return;
         }

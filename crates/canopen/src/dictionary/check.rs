@@ -1,6 +1,6 @@
 //! Checks of a table of rows at compile time. The code at run time relies on them. A panic here is a compile error.
 
-use super::check_pdos::check_pdo_row;
+use super::check_pdos::{check_pdo_row, of_first_and_last};
 use super::compile::{effective_limits, find};
 use super::fail::{fail, require};
 use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
@@ -28,6 +28,8 @@ pub const fn check(rows: &[Object]) {
         let is_more = row.index > 0x1201 && row.index < 0x1280;
         let follows = !is_more || row.sub > 0 || (i > 0 && rows[i - 1].index + 1 == row.index);
         require!(follows, row, "further SDO servers begin at 1201h and have no gap");
+        let is_next = row.index != 0x1016 || row.sub == 0 || rows[i - 1].sub + 1 == row.sub;
+        require!(is_next, row, "the heartbeats to monitor have no gap");
         i += 1;
     }
     // The order of the rows is checked by now: they are found by a binary search.
@@ -70,11 +72,33 @@ const fn check_row(row: &Object) {
     check_limits(row);
     check_default(row);
     check_mapping(row);
+    check_can_id(row);
     let is_group = !matches!(row.rule, Rule::Store | Rule::Restore) || row.sub <= 8;
     require!(is_group, row, "storage groups of a product have the sub-indexes 4 to 8");
     // A read-only value can be stored too, such as the offset that the device computes from a preset.
     let lasts = matches!(row.access, Access::ReadWrite | Access::ReadOnly);
     require!(row.group.is_none() || lasts, row, "a constant or a command cannot be stored");
+    let has_value = row.stored_size() > 0;
+    require!(row.group.is_none() || has_value, row, "an entry without a value in the image cannot be stored");
+}
+
+/// The default of a COB-ID is one that a client could write. Those of PDOs have a check of their own.
+const fn check_can_id(row: &Object) {
+    if !matches!(row.rule, Rule::SyncCobId | Rule::SyncProducer | Rule::TimeCobId | Rule::EmcyCobId) {
+        return;
+    }
+    let (Some(first), Some(last)) = of_first_and_last(row.default) else {
+        fail(row.index, row.sub, "the COB-ID has a CAN-ID of more than 11 bits");
+    };
+    let is_off = matches!(row.rule, Rule::EmcyCobId) && first.bit31;
+    let is_free = is_off || !first.id.is_restricted() && !last.id.is_restricted();
+    require!(is_free, row, "the CAN-ID is reserved for another service");
+    let is_producer = matches!(row.rule, Rule::SyncCobId) && first.bit30;
+    require!(
+        !is_producer,
+        row,
+        "the rows are those of a consumer of SYNC, and the default makes it a producer"
+    );
 }
 
 const fn check_default(row: &Object) {
@@ -92,9 +116,12 @@ const fn check_default(row: &Object) {
             require!(text.is_ascii(), row, "the default is not ASCII");
             require!(text.len() <= capacity as usize, row, "the default is longer than the string");
         }
+        (DefaultValue::None, Type::OctetString(capacity)) => {
+            require!(capacity as usize <= BUFFER, row, "the string is longer than an SDO transfer can be");
+        }
         (DefaultValue::NodeId(_), Type::Unsigned32)
         | (DefaultValue::Integer(_), Type::Real64)
-        | (DefaultValue::None, Type::Domain | Type::OctetString(_)) => (),
+        | (DefaultValue::None, Type::Domain) => (),
         _ => fail(row.index, row.sub, "the default is of another type than the entry"),
     }
 }

@@ -45,13 +45,7 @@ const fn check_communication(rows: &[Object], row: &Object) {
     );
     let needs_remote = transmission.needs_remote();
     require!(is_sent(row) || !needs_remote, kind, "an RPDO has no transmission type 252 or 253");
-    // The COB-IDs with the lowest and with the highest node-ID.
-    let (first, last) = match id.default {
-        DefaultValue::NodeId(base) => (base.wrapping_add(1), base.wrapping_add(127)),
-        DefaultValue::Integer(value) => (value as u32, value as u32),
-        _ => (0, 0),
-    };
-    let (Some(first), Some(last)) = (CobId::parse(first), CobId::parse(last)) else {
+    let (Some(first), Some(last)) = of_first_and_last(id.default) else {
         fail(id.index, 1, "the COB-ID has a CAN-ID of more than 11 bits");
     };
     if first.bit31 {
@@ -69,6 +63,16 @@ const fn check_communication(rows: &[Object], row: &Object) {
         kind,
         "a multiplexed PDO has the transmission type 254 or 255",
     );
+}
+
+/// The COB-IDs with the lowest and with the highest node-ID.
+pub(super) const fn of_first_and_last(default: DefaultValue) -> (Option<CobId>, Option<CobId>) {
+    let (first, last) = match default {
+        DefaultValue::NodeId(base) => (base.wrapping_add(1), base.wrapping_add(127)),
+        DefaultValue::Integer(value) => (value as u32, value as u32),
+        _ => (0, 0),
+    };
+    (CobId::parse(first), CobId::parse(last))
 }
 
 /// Checks the mapping entries: each maps an object in this direction with its length, and together the mapped objects

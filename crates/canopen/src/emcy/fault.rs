@@ -69,7 +69,8 @@ impl Condition {
     }
 }
 
-/// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33).
+/// A class of errors: a sub-index of object 1029h, which defines the change of the NMT state (CiA 301, 7.5.2.33); 1 to 7.
+/// Another number is no error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ErrorClass(pub u8);

@@ -278,7 +278,7 @@ impl Producer {
     }
 }
 
-/// The bit of a class in a set of eight; 0 for a class beyond them.
+/// The bit of a class in a set of eight; 0 for a number that is no class.
 fn error_bit(ErrorClass(sub): ErrorClass) -> u8 {
-    1_u8.checked_shl(sub.into()).unwrap_or(0)
+    1_u8.checked_shl(sub.into()).unwrap_or(0) & !1
 }

@@ -134,3 +134,19 @@ fn rows_without_100ch_have_no_guarding() {
     assert!(Services::of(ROWS).contains(Services::GUARDING));
     assert!(!Services::of(&objects::emergency()).contains(Services::GUARDING));
 }
+
+/// A device has either a heartbeat or guarding (CiA 301, 7.2.8.2).
+#[test]
+fn the_heartbeat_ends_life_guarding() {
+    let mut node = node();
+    write(&mut node, (0x100C, 0), &[100, 0]);
+    write(&mut node, (0x100D, 0), &[3]);
+    guard(&mut node, 0x705, 2);
+    write(&mut node, (0x1017, 0), &[50, 0]);
+    let mut sent = Sent::default();
+    for now in (1..20).map(|time| Instant(time * 50_000)) {
+        let _ = node.poll(now, &mut sent);
+    }
+    assert!(node.application().faults.is_empty());
+    assert!(sent.0.iter().all(|frame| frame.id() == 0x705));
+}

@@ -281,3 +281,15 @@ fn lss_works_in_every_state_and_short_frames_are_none() {
     bench.receive(Frame::new(0x7E5, &[4, 1]).unwrap());
     assert_eq!(send(&mut bench, Request::InquireNodeId), None);
 }
+
+#[test]
+fn a_bit_rate_changes_at_once_without_a_delay() {
+    let mut bench = Bench::booted();
+    for request in [[4, 1, 0, 0, 0, 0, 0, 0], [0x13, 0, 3, 0, 0, 0, 0, 0], [0x15, 0, 0, 0, 0, 0, 0, 0]] {
+        bench.receive(Frame::new(0x7E5, &request).unwrap());
+    }
+    let rate = std::iter::from_fn(|| bench.take_action()).find(|action| matches!(action, Action::BitRate(_)));
+    assert_eq!(rate, Some(Action::BitRate(BitRate::from_index(3).unwrap())));
+    bench.take();
+    assert!(bench.read(0x1000, 0).is_ok());
+}

@@ -330,3 +330,27 @@ fn a_pause_is_possible_between_requests_outside_of_operational() {
     bench.write(0x1017, 0, &[0, 0]).unwrap();
     assert!(can_pause(&bench, 3_600_000), "without heartbeats");
 }
+
+/// The queue is full at the start, and has room again before the device tries to boot up once more.
+#[test]
+fn nothing_precedes_the_boot_up_message() {
+    type Ask = fn(&mut Bench);
+    let asks: [Ask; 4] = [
+        |bench| bench.nmt(1),
+        |bench| drop(bench.ask_raw([0x40, 0, 0x10, 0, 0, 0, 0, 0])),
+        |bench| bench.raise(0),
+        |bench| bench.set_value(1, &[1]),
+    ];
+    for ask in asks {
+        let mut bench = Bench::unstarted();
+        bench.out.room = 0;
+        bench.start();
+        assert_eq!(bench.device.state(), State::Initialising);
+        bench.out.room = usize::MAX;
+        ask(&mut bench);
+        assert!(bench.take().is_empty());
+        bench.run(Duration::from_millis(5));
+        assert_eq!(bench.take().first().map(Frame::id), Some(0x705));
+        assert_eq!(bench.device.state(), State::PreOperational);
+    }
+}

@@ -111,3 +111,18 @@ fn after_the_window_a_synchronous_pdo_is_dropped() {
         assert_eq!(bench.take().iter().filter(|frame| frame.id() == TPDO).count(), sent, "{window}");
     }
 }
+
+/// The usual sequence of a master that starts again: its SYNC is away, and the NMT state changes meanwhile.
+#[test]
+fn a_missing_sync_is_no_fault_any_more_when_it_is_back_in_another_state() {
+    for commands in [[0x80, 1], [2, 1], [1, 1]] {
+        let mut bench = bench(1, 0, false);
+        bench.write32(0x1006, 0, 100_000).unwrap();
+        bench.sync();
+        bench.run(Duration::from_millis(200));
+        assert_eq!(emergencies(&mut bench), [0x8100]);
+        commands.into_iter().for_each(|command| bench.nmt(command));
+        bench.sync();
+        assert_eq!(emergencies(&mut bench), [0], "{commands:x?}");
+    }
+}

@@ -208,3 +208,33 @@ fn the_attributes_of_a_row_fit_together() {
     let message = "2000h:255: an object has at most 255 entries, 0 to 254";
     assert_error(&[&[row(Type::Unsigned8, Access::ReadWrite), last]], message);
 }
+
+/// Values that an SDO client could not write are no defaults either.
+#[test]
+fn the_cob_id_of_a_service_can_be_used() {
+    let taken = "the CAN-ID is reserved for another service";
+    let emcy = Object::new(0x1014, 0, "", Type::Unsigned32, Access::ReadWrite);
+    assert_error(&[&[emcy]], &format!("1014h:0: {taken}"));
+    assert_eq!(compile_error(&[&[emcy.value(0x8000_0000)]]), None);
+    let wide = "1014h:0: the COB-ID has a CAN-ID of more than 11 bits";
+    assert_error(&[&[emcy.value(0x2000_0085)]], wide);
+    let mut rows = objects::sync_producer(1000);
+    rows[0] = rows[0].value(0x4000_0000);
+    assert_error(&[&rows], &format!("1005h:0: {taken}"));
+    let mut rows = objects::sync_consumer();
+    rows[0] = rows[0].value(0x4000_0080);
+    let message = "1005h:0: the rows are those of a consumer of SYNC, and the default makes it a producer";
+    assert_error(&[&rows], message);
+}
+
+#[test]
+fn an_entry_that_could_not_work_does_not_compile() {
+    let watches = objects::heartbeat_consumer::<4>();
+    let gap: Vec<Object> = watches.into_iter().filter(|row| row.sub != 2).collect();
+    assert_error(&[&gap], "1016h:3: the heartbeats to monitor have no gap");
+    let mut errors = objects::error_field::<4>();
+    errors[0] = errors[0].stored(Group::Communication);
+    assert_error(&[&errors], "1003h:0: an entry without a value in the image cannot be stored");
+    let long = Object::new(0x2000, 0, "", Type::OctetString(200), Access::ReadWrite);
+    assert_error(&[&[long]], "2000h:0: the string is longer than an SDO transfer can be");
+}

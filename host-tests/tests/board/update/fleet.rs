@@ -226,3 +226,22 @@ fn a_node_of_several_is_switched_off_halfway_and_gone_on_with() {
     let in_turn: Vec<Value> = others.chain([off]).map(|node| updated(node, [&a, &b])).collect();
     assert_eq!(reports, in_turn);
 }
+
+/// With `--force` the same code is installed again, with another version, counter or key list. A node that is lost in the
+/// download still has the code of before, which is no sign of the new image.
+#[test]
+fn a_forced_update_with_the_same_code_is_repeated_after_a_loss() {
+    for (personality, kbit) in
+        either(vec![("encoder", 1000)], PERSONALITIES.into_iter().zip([1000, 500, 250, 125]).collect())
+    {
+        let world = share(world(&format!("--bitrate {kbit} --node 16:{personality}")));
+        let image = signed(version_a().code, |about| about.version = VERSION_B);
+        assert_eq!(image.header.code_crc(), version_a().header.code_crc());
+        let outage = Outage::halfway(&world, 0, &image);
+        let reports = update(&world, "16", &image, Some(outage));
+        assert_eq!(reports[0]["result"], "updated", "{personality}");
+        let bytes = image.to_bytes();
+        let mut bench = Bench::with(unshare(world), kbit * 1000, 16);
+        assert!(bench.application().starts_with(&bytes), "{personality}: the new image is not there");
+    }
+}

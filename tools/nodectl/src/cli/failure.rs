@@ -185,7 +185,7 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Sdo(error) => sdo_code(error),
         update::Error::Closed { .. } => 1,
         update::Error::Bus(_) => 4,
-        update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
+        update::Error::Stuck { .. } | update::Error::Left { .. } | update::Error::Lost { .. } => 3,
         update::Error::Flash { .. } | update::Error::Identification { .. } => 5,
         update::Error::Board { .. }
         | update::Error::Older { .. }

@@ -75,6 +75,13 @@ pub enum Error {
         /// The node.
         node: NodeId,
     },
+    /// The loader has started its program before the program was cleared. The update continues: it stops the program
+    /// again.
+    #[error("node {}: its loader starts the program by itself", .node.get())]
+    Left {
+        /// The node.
+        node: NodeId,
+    },
     /// The node has not stopped, started or finished in time.
     #[error("node {}: it does not {what}", .node.get())]
     Stuck {
@@ -94,9 +101,10 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether the node or the bus was lost, so that continuing may succeed.
-    pub(super) fn is_silence(&self) -> bool {
+    /// Whether the node or the bus was lost, or the loader has left, so that continuing may succeed.
+    pub(super) fn can_continue(&self) -> bool {
         match self {
+            Error::Left { .. } => true,
             // A node that has not heard this program for a while is lost, too.
             Error::Sdo(error) => error.is_silence() || error.abort().is_some_and(AbortCode::is_time_out),
             Error::Bus(error) => matches!(error, BusError::Lost(_)),

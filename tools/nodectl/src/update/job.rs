@@ -102,7 +102,7 @@ impl<'a> Job<'a> {
         loop {
             match self.attempt(network, watcher) {
                 // A node that has never answered does not count as lost.
-                Err(error) if error.is_silence() && self.before.is_some() && resumes > 0 => {
+                Err(error) if error.can_continue() && self.before.is_some() && resumes > 0 => {
                     resumes -= 1;
                     watcher.step(self.node, Step::Lost);
                     self.wait_for_return(network, patience)?;
@@ -116,12 +116,12 @@ impl<'a> Job<'a> {
     /// Brings the node from any state to the new program.
     fn attempt(&mut self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<Outcome, Error> {
         watcher.step(self.node, Step::Identify);
-        let now = self.state(network)?;
+        let now = self.settled_state(network, watcher)?;
         if self.before.is_none() {
             self.check(network, &now)?;
             self.before = Some(now.clone());
         }
-        let is_there = self.is_there(&now);
+        let is_there = self.is_there(network, &now)?;
         if !is_there {
             self.replace(network, now.is_running, watcher)?;
         }
@@ -252,6 +252,9 @@ impl<'a> Job<'a> {
             if self.program(network).status()?.is_some_and(is_on_trial) {
                 return Err(Error::OnTrial { node: self.node });
             }
+            if error.abort().is_some() && self.program(network).is_running()? {
+                return Err(Error::Left { node: self.node });
+            }
             tries -= 1;
             let is_late = network.now() >= until;
             if tries == 0 || is_late || error.abort().is_none() {
@@ -263,14 +266,14 @@ impl<'a> Job<'a> {
         self.wait_for_flash(network, is_cleared)
     }
 
-    /// Waits until the flash is no longer busy with an earlier command.
-    fn wait_while_busy(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+    /// Waits until the flash is no longer busy with an earlier command. Returns whether it was.
+    fn wait_while_busy(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<bool, Error> {
         let is_busy = self.program(network).status()?.is_some_and(|status| status.busy);
         if is_busy {
             watcher.step(self.node, Step::Busy);
             self.wait_for_flash(network, |_| true)?;
         }
-        Ok(())
+        Ok(is_busy)
     }
 
     /// Downloads the program in blocks; in segments where the node does not support blocks.
@@ -348,6 +351,14 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// The state of a node whose loader is not busy. One that lost its power in a copy finishes the copy first, and has
+    /// another program then.
+    fn settled_state(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<State, Error> {
+        let now = self.state(network)?;
+        let is_settled = now.is_running || !self.wait_while_busy(network, watcher)?;
+        if is_settled { Ok(now) } else { self.state(network) }
+    }
+
     fn state(&self, network: &mut Network) -> Result<State, Error> {
         let is_running = self.program(network).is_running()?;
         let identification = self.program(network).identification()?;
@@ -371,16 +382,20 @@ impl<'a> Job<'a> {
 
     /// Whether the node has the new program. A forced update has to clear and download first, even if the node has the
     /// program already. If a loader does not tell its program (1F56h reads 0), the download is trusted.
-    fn is_there(&self, now: &State) -> bool {
+    fn is_there(&self, network: &mut Network, now: &State) -> Result<bool, Error> {
         let is_complete = self.progress == Progress::Complete;
-        match &self.image.info {
-            Some(info) => {
-                let is_it = now.is_valid
-                    && now.identification.map_or(is_complete, |found| found == info.identification);
-                is_it && (self.progress != Progress::Untouched || !self.options.force)
-            }
-            None => is_complete,
+        let Some(info) = &self.image.info else { return Ok(is_complete) };
+        let is_it =
+            now.is_valid && now.identification.map_or(is_complete, |found| found == info.identification);
+        if !is_it || is_complete || !self.options.force {
+            return Ok(is_it);
         }
+        // A node that keeps its old program while it receives the new one may have the same program as before. Only a new
+        // one is on trial.
+        let before = self.before.as_ref().and_then(|before| before.identification);
+        let is_other = before != Some(info.identification);
+        let is_new = is_other || now.is_running && self.program(network).is_on_trial()?;
+        Ok(self.progress == Progress::Cleared && is_new)
     }
 
     fn text(&self, network: &mut Network, at: Multiplexer) -> Result<Option<String>, Error> {

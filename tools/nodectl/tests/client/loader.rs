@@ -51,7 +51,7 @@ const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// The time from a command to the first answer in the new state.
 const RESTART: Duration = Duration::from_millis(200);
-/// The time of erasing, and below it the time of checking the downloaded program.
+/// The time of erasing and of a copy, and below it the time of checking the downloaded program.
 const ERASE: Duration = Duration::from_millis(1500);
 const CHECK: Duration = Duration::from_millis(100);
 
@@ -81,6 +81,10 @@ pub(crate) struct Flash {
     runs: bool,
     /// The state after the restart in progress.
     next: Option<bool>,
+    /// When the loader has finished a copy, and starts the program by itself.
+    copied: Option<Instant>,
+    /// The loader starts its program by itself just before it receives this command.
+    pub(crate) starts_before: Option<u8>,
     now: Instant,
 }
 
@@ -99,6 +103,7 @@ impl Flash {
     fn command(&mut self, command: u8) -> Result<(), Abort> {
         self.admit()?;
         self.commands.push(command);
+        self.runs |= self.starts_before.take_if(|before| *before == command).is_some();
         match (command, self.runs) {
             (0, true) => self.next = Some(false),
             (0, false) => (),
@@ -191,6 +196,8 @@ impl Loader {
             busy_until: Instant(0),
             runs: !program.is_empty(),
             next: None,
+            copied: None,
+            starts_before: None,
             now: Instant(0),
         };
         Loader { id, device: Device::new(&DICTIONARY, id, flash), up: Instant(0), is_started: false }
@@ -209,6 +216,14 @@ impl Loader {
         let runs = self.flash().runs;
         self.flash().challenge(false);
         self.restart(runs, until);
+    }
+
+    /// Switches the node off until an instant, within the copy of a new program: its loader then finishes the copy, and
+    /// starts the program.
+    pub(crate) fn switch_off_within_copy(&mut self, until: Instant) {
+        let copied = until + ERASE;
+        (self.flash().copied, self.flash().busy_until) = (Some(copied), copied);
+        self.switch_off(until);
     }
 
     /// Demands an authorisation by this key from now on.
@@ -280,12 +295,16 @@ impl Station for Loader {
     }
 
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        if self.flash().copied.take_if(|copied| *copied <= now).is_some() {
+            self.restart(true, now + RESTART);
+        }
         if now < self.up {
             return self.up;
         }
         if !std::mem::replace(&mut self.is_started, true) {
             let _ = self.device.start(now, out);
         }
-        self.device.poll(now, out).due()
+        let copied = self.flash().copied.unwrap_or(Instant::NEVER);
+        self.device.poll(now, out).due().min(copied)
     }
 }

@@ -330,6 +330,54 @@ fn a_guarded_node_that_is_switched_off_halfway_is_gone_on_with() {
     assert!(switch.diary.steps_of(3).contains(&Step::Back));
 }
 
+/// Switches node 3 off when the download is complete, within the copy of the new program.
+struct SwitchInCopy<'a> {
+    wire: &'a Wire<Vec<Loader>>,
+    diary: Diary,
+}
+
+impl Watcher for SwitchInCopy<'_> {
+    fn step(&mut self, node: NodeId, step: Step) {
+        self.diary.step(node, step);
+        if step == Step::Verify {
+            self.wire.station(|loaders| loaders[0].switch_off_within_copy(Instant(20_000_000)));
+        }
+    }
+
+    fn progress(&mut self, node: NodeId, done: usize, total: usize) {
+        self.diary.progress(node, done, total);
+    }
+}
+
+/// The loader finishes the copy and starts the new program by itself.
+#[test]
+fn a_node_that_is_switched_off_within_the_copy_is_not_updated_twice() {
+    for is_guarded in [false, true] {
+        let wire = fleet(&[3]);
+        if is_guarded {
+            wire.station(|loaders| loaders[0].set_key(KEY));
+        }
+        let mut switch = SwitchInCopy { wire: &wire, diary: Diary::default() };
+        let results = update(&mut wire.network(), &nodes(&[3]), &image(NEW), &with_key(), &mut switch);
+        let [(_, result)] = results.try_into().expect("one result");
+        let outcome = result.unwrap();
+        assert_eq!(outcome.new_version.as_deref(), Some("1.1.0"), "{is_guarded}");
+        assert_eq!(outcome.old_version.as_deref(), Some("1.0.0"), "{is_guarded}");
+        let steps = switch.diary.steps_of(3);
+        assert_eq!(steps.iter().filter(|step| **step == Step::Download).count(), 1, "{steps:?}");
+        assert_eq!(wire.station(|loaders| loaders[0].flash().erased), 1, "{is_guarded}");
+    }
+}
+
+#[test]
+fn a_node_whose_loader_starts_the_old_program_by_itself_is_stopped_again() {
+    let (wire, mut diary) = (fleet(&[3]), Diary::default());
+    wire.station(|loaders| loaders[0].flash().starts_before = Some(3));
+    let outcome = one(&wire, &image(NEW), &options(), &mut diary).unwrap();
+    assert_eq!(outcome.new_version.as_deref(), Some("1.1.0"));
+    assert_eq!(commands(&wire), [0, 3, 0, 3, 1]);
+}
+
 #[test]
 fn a_node_that_stays_away_does_not_keep_the_others_from_it() {
     let (_, results) = switched_off(Instant::NEVER);

@@ -135,6 +135,11 @@ impl<O: Objects> Server<O> {
             return self.upload_parts(Source::in_parts(at, len), at, objects);
         }
         let value = objects.read(at)?;
+        self.upload_value(at, value)
+    }
+
+    /// Begins the upload of a value that has been read.
+    fn upload_value(&mut self, at: Multiplexer, value: &[u8]) -> Answer {
         if value.len() <= 4 {
             return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(value))));
         }
@@ -232,10 +237,11 @@ impl<O: Objects> Server<O> {
                 };
             }
         }
-        let source = Source::new(at, objects.read(at)?, &mut self.buffer);
-        if source.len() <= usize::from(threshold) {
-            return self.upload(at, objects);
+        let value = objects.read(at)?;
+        if value.len() <= usize::from(threshold) {
+            return self.upload_value(at, value);
         }
+        let source = Source::new(at, value, &mut self.buffer);
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
         Ok(self.send_blocks(at, source, block_size))
     }

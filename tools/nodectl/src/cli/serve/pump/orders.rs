@@ -13,7 +13,7 @@ use crate::bus::clock;
 use crate::cli::serve::jobs;
 use crate::cli::serve::live::Key;
 use crate::cli::serve::pages::{Filter, Page};
-use crate::cli::serve::request::{self, What};
+use crate::cli::serve::request::{self, What, Whom};
 use crate::cli::serve::schedule::{Haste, Lane};
 
 impl Pump {
@@ -138,6 +138,11 @@ impl Pump {
             _ => None,
         };
         let only_reads = !what.writes();
+        let ordered = match what {
+            What::Nmt { node: Whom::Node(node), .. } => Lane::Node(node.0),
+            What::Nmt { node: Whom::All(_), .. } => Lane::Everything,
+            _ => Lane::Nothing,
+        };
         let means = jobs::Means { control: self.setup.control, file, number: self.files };
         let task = match jobs::task(what, means) {
             Ok(task) => task,
@@ -148,12 +153,7 @@ impl Pump {
         {
             page.file = task.keeps;
         }
-        let updated = match task.lane {
-            Lane::Node(node) => self.nodes.get(node).is_some_and(|node| node.updating).then_some(node),
-            Lane::Everything => self.nodes.iter().find(|(_, node)| node.updating).map(|(node, _)| node),
-            Lane::Lss | Lane::Nothing => None,
-        };
-        if let Some(node) = updated {
+        if let Some(node) = self.updated(task.lane).or_else(|| self.updated(ordered)) {
             let words = format!("node {} is being updated", node.get());
             return self.answer(&asker, Err(Refusal::new(words)));
         }
@@ -165,6 +165,15 @@ impl Pump {
         let haste = if has_token { Haste::Token } else { Haste::Asked };
         let waiting = Waiting { asker: Some(asker), node, only_reads, job: task.job };
         self.enqueue(task.lane, haste, waiting);
+    }
+
+    /// The node in this lane that is being updated.
+    fn updated(&self, lane: Lane) -> Option<NodeId> {
+        match lane {
+            Lane::Node(node) => self.nodes.get(node).is_some_and(|node| node.updating).then_some(node),
+            Lane::Everything => self.nodes.iter().find(|(_, node)| node.updating).map(|(node, _)| node),
+            Lane::Lss | Lane::Nothing => None,
+        }
     }
 
     pub(super) fn follow(&mut self, page: PageId, signals: &[String]) -> Result<Json, Refusal> {
