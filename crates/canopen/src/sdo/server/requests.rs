@@ -135,17 +135,17 @@ impl<O: Objects> Server<O> {
             return self.upload_parts(Source::in_parts(at, len), at, objects);
         }
         let value = objects.read(at)?;
-        self.upload_value(at, value)
+        Ok(self.upload_value(at, value))
     }
 
     /// Begins the upload of a value that has been read.
-    fn upload_value(&mut self, at: Multiplexer, value: &[u8]) -> Answer {
+    fn upload_value(&mut self, at: Multiplexer, value: &[u8]) -> bool {
         if value.len() <= 4 {
-            return Ok(self.set_reply(Response::Uploaded(at, Bytes::from_slice(value))));
+            return self.set_reply(Response::Uploaded(at, Bytes::from_slice(value)));
         }
         let source = Source::new(at, value, &mut self.buffer);
         self.transfer = Transfer::Upload(Upload::new(source));
-        Ok(self.set_reply(Response::UploadSegmented(at, Some(source.size()))))
+        self.set_reply(Response::UploadSegmented(at, Some(source.size())))
     }
 
     /// Begins an upload in parts, in segments. One to four bytes are in the response itself, which cannot be empty.
@@ -239,7 +239,7 @@ impl<O: Objects> Server<O> {
         }
         let value = objects.read(at)?;
         if value.len() <= usize::from(threshold) {
-            return self.upload_value(at, value);
+            return Ok(self.upload_value(at, value));
         }
         let source = Source::new(at, value, &mut self.buffer);
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
