@@ -67,7 +67,7 @@ impl Indicators {
     /// The next instant at which a pattern may change: each change is at a multiple of 50 ms.
     #[must_use]
     pub fn next_change(now: Instant) -> Instant {
-        Instant((now.0 / FLICKER + 1) * FLICKER)
+        Instant((now.0 / FLICKER + 1).saturating_mul(FLICKER))
     }
 
     /// Whether RUN and ERROR are on. To be asked again at [`next_change`](Indicators::next_change) at the latest, and where
@@ -76,7 +76,7 @@ impl Indicators {
     pub fn levels(&self, now: Instant) -> [bool; 2] {
         // Flickering begins with RUN.
         let turn = if self.error == Pattern::Flickering { FLICKER } else { 0 };
-        [self.run.is_on(now), self.error.is_on(Instant(now.0 + turn))]
+        [self.run.is_on(now), self.error.is_on(Instant(now.0.wrapping_add(turn)))]
     }
 }
 

@@ -40,7 +40,8 @@ pub(crate) struct Consumer {
     /// When the next SYNC is missing; `NEVER` before the first SYNC.
     due: Tick,
     window_end: Tick,
-    is_missing: bool,
+    /// The last SYNC was missing, or had the wrong length.
+    is_disturbed: bool,
 }
 
 impl Consumer {
@@ -50,7 +51,7 @@ impl Consumer {
             settings: Settings { cob_id: 0x80, period: 0, window: 0, overflow: 0 },
             due: Tick::NEVER,
             window_end: Tick::NEVER,
-            is_missing: false,
+            is_disturbed: false,
         }
     }
 
@@ -64,8 +65,13 @@ impl Consumer {
     pub(crate) fn configure(&mut self, settings: Settings) {
         self.id = CobId::parse(settings.cob_id).map_or(self.id, |cob_id| cob_id.id);
         self.settings = settings;
-        self.is_missing = false;
+        self.is_disturbed = false;
         self.stop();
+    }
+
+    /// Takes a new window, which applies from the next SYNC on.
+    pub(crate) fn set_window(&mut self, window: u32) {
+        self.settings.window = window;
     }
 
     /// After a change of the NMT state: period and window begin again with the next SYNC, which ends the fault of a missing
@@ -88,7 +94,10 @@ impl Consumer {
         let counter = match (frame.data(), self.settings.overflow) {
             ([], 0) => None,
             (&[counter], 1..) => Some(counter),
-            _ => return Err(WrongLength),
+            _ => {
+                self.is_disturbed = true;
+                return Err(WrongLength);
+            }
         };
         let Settings { period, window, .. } = self.settings;
         self.window_end = if window == 0 { Tick::NEVER } else { now.plus_long(window) };
@@ -111,14 +120,14 @@ impl Consumer {
     pub(crate) fn expire(&mut self, now: Tick) -> bool {
         let is_missing = now >= self.due;
         if is_missing {
-            (self.due, self.is_missing) = (Tick::NEVER, true);
+            (self.due, self.is_disturbed) = (Tick::NEVER, true);
         }
         is_missing
     }
 
-    /// Whether a SYNC was missing before this one. Reported once.
+    /// Whether the SYNC before this one was missing or had the wrong length. Reported once.
     pub(crate) fn is_back(&mut self) -> bool {
-        core::mem::take(&mut self.is_missing)
+        core::mem::take(&mut self.is_disturbed)
     }
 }
 

@@ -88,7 +88,7 @@ pub trait Application {
     fn written(&mut self, _entry: &Entry, _image: &mut [u8]) {}
 
     /// The data of an RPDO is in the image. `rpdo` is the number of the RPDO, 1 to 512. The data of a synchronous RPDO
-    /// is written to the image with the next SYNC.
+    /// is written to the image with the next SYNC. Not called for a multiplexed PDO whose value is not taken.
     fn received(&mut self, _rpdo: u16, _image: &mut [u8]) {}
 
     /// A SYNC has arrived in the state Operational. The data of the synchronous RPDOs is in the image; the synchronous

@@ -64,6 +64,7 @@ impl<D: Definition> Device<D> {
     pub fn error(&mut self, class: ErrorClass) -> Next {
         self.inner.emcy.add_error(class);
         self.inner.react();
+        self.silence_services();
         self.inner.services_due = STALE;
         self.process_next()
     }

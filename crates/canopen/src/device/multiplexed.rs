@@ -80,26 +80,28 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Takes a received multiplexed PDO. `addressing` is the mode of the RPDO; a frame of the other mode is ignored.
-    pub(super) fn on_mpdo(&mut self, frame: [u8; 8], addressing: Addressing, now: Tick) {
-        let Some(mpdo) = Mpdo::parse(frame) else { return };
+    /// Returns whether a value is in the image.
+    pub(super) fn on_mpdo(&mut self, frame: [u8; 8], addressing: Addressing, now: Tick) -> bool {
+        let Some(mpdo) = Mpdo::parse(frame) else { return false };
         match (mpdo.address, addressing) {
             (Address::Destination(node), Addressing::Destination)
                 if node.is_none() || node == self.node_id =>
             {
-                self.take_addressed(&mpdo, node, now);
+                self.take_addressed(&mpdo, node, now)
             }
             (Address::Source(node), Addressing::Source) => self.dispatch(&mpdo, node),
-            _ => (),
+            _ => false,
         }
     }
 
     /// Takes an object for this node or for all nodes. An object that is missing or rejects the value is an error only
     /// if this node alone is addressed.
-    fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Tick) {
+    fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Tick) -> bool {
         let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
         if !is_taken && node.is_some() {
             self.report(Fault::MpdoNotTaken, now);
         }
+        is_taken
     }
 
     /// Whether a frame of any node can be a multiplexed PDO for this node: eight bytes that name an object which
@@ -124,15 +126,15 @@ impl<D: Definition> Inner<D> {
         self.store_process_value(&entry, bytes)
     }
 
-    fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
+    fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) -> bool {
         let count = self.number(DISPATCHING_LIST, 0).to_le_bytes()[0];
         for line in 0..count {
             let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
             if let Some(at) = target {
-                let _ = self.store_mpdo(at, mpdo.data);
-                return;
+                return self.store_mpdo(at, mpdo.data);
             }
         }
+        false
     }
 
     fn dispatching_line(&self, sub: u8) -> Option<DispatchingLine> {

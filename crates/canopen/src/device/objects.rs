@@ -219,15 +219,12 @@ impl<D: Definition> Inner<D> {
             Rule::GuardTime | Rule::LifeTimeFactor if Self::has(Services::GUARDING) => {
                 self.configure_guarding(now);
             }
-            Rule::SyncCobId
-            | Rule::SyncProducer
-            | Rule::SyncPeriod
-            | Rule::SyncWindow
-            | Rule::SyncOverflow
+            Rule::SyncCobId | Rule::SyncProducer | Rule::SyncPeriod | Rule::SyncOverflow
                 if Self::has(Services::SYNC) =>
             {
                 self.configure_sync(now);
             }
+            Rule::SyncWindow if Self::has(Services::SYNC) => self.sync.set_window(value),
             Rule::EmcyInhibit if Self::has(Services::EMCY) => self.emcy.set_inhibit(low_half(value), now),
             Rule::EmcyCobId if Self::has(Services::EMCY) && self.emcy.configure(value) => {
                 self.report_active(now);
@@ -242,7 +239,7 @@ impl<D: Definition> Inner<D> {
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => {
                 self.configure_watch(entry.sub(), now);
             }
-            Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => self.configure_pdos(now),
+            Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => self.restart_scanner(),
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType

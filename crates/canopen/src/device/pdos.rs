@@ -63,6 +63,11 @@ impl<D: Definition> Inner<D> {
     pub(super) fn configure_pdos(&mut self, now: Tick) {
         self.configure_each(now, |_, _, _| true);
         self.link_pdos();
+        self.restart_scanner();
+    }
+
+    /// Gives the multiplexed TPDO its settings and its objects anew.
+    pub(super) fn restart_scanner(&mut self) {
         if Self::has(Services::MULTIPLEXED_TPDO) {
             self.configure_scanner(None);
         }

@@ -38,14 +38,16 @@ impl<D: Definition> Inner<D> {
         let late = Self::has(Services::SYNC) && rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
         self.process_due = self.process_due.min(rpdo.due());
-        let has_faults = rpdo.has_faults();
+        let (has_faults, number) = (rpdo.has_faults(), rpdo.number());
         if is_valid {
             self.store_rpdo(place, frame.bytes());
         }
         if Self::has(Services::MULTIPLEXED_RPDO)
             && let Reception::Multiplexed(addressing) = reception
         {
-            self.on_mpdo(frame.bytes(), addressing, now);
+            if self.on_mpdo(frame.bytes(), addressing, now) {
+                self.application.received(number, self.image.as_mut());
+            }
         }
         if reception != Reception::Complete || has_faults {
             self.on_reception(place, reception, now);

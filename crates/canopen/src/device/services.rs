@@ -67,14 +67,13 @@ impl<D: Definition> Services<D> {
         self.lss.set_node_id(node_id);
     }
 
-    /// Resets the services. Returns the node-ID with which the device starts.
-    pub(super) fn restart(&mut self, inner: &mut Inner<D>) -> Option<NodeId> {
+    /// Resets the services.
+    pub(super) fn restart(&mut self, inner: &mut Inner<D>) {
         self.forget_transfers(inner);
         if D::Application::LSS {
             self.lss.restart();
         }
         self.sdo_request = sdo_request(self.lss.node_id());
-        self.lss.node_id()
     }
 
     /// Whether no client waits for a response, except for that of a job.

@@ -23,19 +23,21 @@ enum Reset {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Scope {
     Everything,
-    /// The objects below 2000h, and others that are stored with them.
+    /// The objects below 2000h but those that are stored with other groups, and others that are stored with them.
     Communication,
     Group(Group),
 }
 
 impl Scope {
     fn contains(self, entry: &Entry) -> bool {
+        let group = entry.attributes.group;
         match self {
             Scope::Everything => true,
-            Scope::Communication => {
-                entry.index() < 0x2000 || entry.attributes.group == Some(Group::Communication)
-            }
-            Scope::Group(group) => entry.attributes.group == Some(group),
+            Scope::Communication => match group {
+                Some(group) => group == Group::Communication,
+                None => entry.index() < 0x2000,
+            },
+            Scope::Group(own) => group == Some(own),
         }
     }
 }
@@ -73,7 +75,12 @@ impl Pending {
 
     /// The values have been loaded, so all identifiers and parameters may have changed.
     fn values_loaded(&mut self) {
-        *self = Pending { identifiers: true, parameters: true, is_waiting: true, ..Pending::new() };
+        (self.identifiers, self.parameters, self.is_waiting) = (true, true, true);
+    }
+
+    /// The device starts. What a master or a client has asked for still waits for the caller.
+    fn started(&mut self) {
+        (self.reset, self.reset_is_new, self.next_state) = (Reset::Node, false, None);
     }
 
     pub(super) fn has_action(&self) -> bool {
@@ -123,11 +130,12 @@ impl<D: Definition> Device<D> {
     /// used from now on. Without a node-ID, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let now = self.tick(now);
-        let node_id = self.services.restart(&mut self.inner);
+        self.services.restart(&mut self.inner);
         self.inner.enter(State::Initialising);
-        self.inner.node_id = node_id;
         self.load();
         let inner = &mut self.inner;
+        inner.pending.started();
+        let node_id = inner.node_id;
         inner.heartbeat = heartbeat::Producer::new();
         if node_id.is_some() {
             inner.configure(now);
@@ -143,9 +151,11 @@ impl<D: Definition> Device<D> {
     // Not inlined: two callers, and much code.
     #[inline(never)]
     pub fn load(&mut self) {
-        let everything = self.inner.pending.reset == Reset::Node;
-        self.inner.load_values(everything);
         let inner = &mut self.inner;
+        if inner.is_initialising() {
+            inner.node_id = self.services.lss.node_id();
+        }
+        inner.load_values(inner.pending.reset == Reset::Node);
         inner.application.initialise(inner.image.as_mut());
         inner.pending.values_loaded();
     }

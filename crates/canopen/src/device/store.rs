@@ -146,11 +146,12 @@ impl<D: Definition> Device<D> {
     /// Whether a pause of `span` disturbs no service, for example while the erase of a flash page stops the core. The
     /// device is Pre-operational or Stopped. No SDO transfer is under way, except one whose response waits for a job. The
     /// next heartbeat is sent within 1.5 times the heartbeat time (1017h), and neither a heartbeat of another node (1016h)
-    /// nor a remote frame of a guarding master (100Ch) is due.
+    /// nor a remote frame of a guarding master (100Ch) nor an own SYNC (1006h) is due.
     #[must_use]
     pub fn can_pause(&self, span: Duration, now: Instant) -> bool {
         let inner = &self.inner;
         let due = inner.heartbeat.latest().min(inner.watches.due()).min(inner.guarding.due());
+        let due = due.min(inner.sync_producer.due());
         matches!(inner.state, State::PreOperational | State::Stopped)
             && self.services.is_between_requests()
             && now + span <= self.clock.instant(due)
@@ -191,7 +192,8 @@ impl<D: Definition> Inner<D> {
         if !Self::has(Services::FAULTS) {
             return Ok(None);
         }
-        let job = self.application.stores(entry).map(Job::Store);
+        let groups = self.application.stores(entry).filter(|_| !entry.rule().is_command());
+        let job = groups.map(Job::Store);
         job.map_or(Ok(()), |job| self.check_job(job))?;
         Ok(job)
     }

@@ -19,12 +19,18 @@ impl<D: Definition> Inner<D> {
             window: self.number(0x1007, 0),
             overflow,
         };
-        if Self::has(Services::SYNC_PRODUCER) {
-            self.sync_producer.configure(&settings);
+        if Self::has(Services::SYNC_PRODUCER) && self.sync_producer.configure(&settings) {
             self.restart_sync();
         }
         self.sync.configure(settings);
+        self.end_sync_faults(now);
+    }
+
+    /// A SYNC is right, or the settings are new.
+    #[inline(never)]
+    fn end_sync_faults(&mut self, now: Tick) {
         self.clear(Fault::SyncMissing, now);
+        self.clear(Fault::SyncLength, now);
     }
 
     /// Begins or ends the production of SYNCs, after a change of the settings or of the NMT state.
@@ -55,10 +61,10 @@ impl<D: Definition> Inner<D> {
 
     pub(super) fn on_sync(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         let Ok(sync) = self.sync.take(frame, context.now) else {
-            return self.report(Fault::SyncLength, context.now);
+            return self.raise(Fault::SyncLength, context.now);
         };
         if self.sync.is_back() {
-            self.clear(Fault::SyncMissing, context.now);
+            self.end_sync_faults(context.now);
         }
         let mut links = self.first_rpdos;
         while let Some(rpdo) = self.rpdos.as_mut().get_mut(links.next(Chain::Synchronous)) {

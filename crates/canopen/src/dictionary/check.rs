@@ -3,7 +3,7 @@
 use super::check_pdos::{check_pdo_row, of_first_and_last};
 use super::compile::{effective_limits, find};
 use super::fail::{fail, require};
-use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
+use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
 use crate::sdo::BUFFER;
 
 /// Checks a table: the rows are sorted, no entry occurs twice, every default has the type of its entry and is within
@@ -73,6 +73,10 @@ const fn check_row(row: &Object) {
     check_default(row);
     check_mapping(row);
     check_can_id(row);
+    let is_relative = matches!(row.default, DefaultValue::NodeId(_));
+    let is_communication = matches!(row.group, Some(Group::Communication));
+    let follows = !is_relative || is_communication || row.group.is_none() && row.index < 0x2000;
+    require!(follows, row, "a default with the node-ID belongs to the communication parameters");
     let is_group = !matches!(row.rule, Rule::Store | Rule::Restore) || row.sub <= 8;
     require!(is_group, row, "storage groups of a product have the sub-indexes 4 to 8");
     // A read-only value can be stored too, such as the offset that the device computes from a preset.

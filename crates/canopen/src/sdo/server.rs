@@ -340,16 +340,23 @@ impl<O: Objects> Server<O> {
     }
 
     /// Sends segments of a block as long as `send` accepts them. Returns whether there is a reply, which is an abort
-    /// message.
+    /// message. A client waits for segments, so a queue that has no room for any does not delay the time-out.
     pub(crate) fn send_block(
         &mut self,
         objects: &mut O,
         now: Tick,
-        send: impl FnMut([u8; 8]) -> bool,
+        mut send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {
         let Transfer::BlockUpload(sender) = &mut self.transfer else { return false };
-        let result = sender.send(&mut self.buffer, objects, send);
-        self.settle(result.map(|()| false), objects, now)
+        let active = &mut self.active;
+        let result = sender.send(&mut self.buffer, objects, |segment| {
+            let is_sent = send(segment);
+            if is_sent {
+                *active = now;
+            }
+            is_sent
+        });
+        result.is_err_and(|abort| self.give_up(abort, objects))
     }
 }
 

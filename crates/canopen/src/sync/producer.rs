@@ -25,12 +25,15 @@ impl Producer {
         self.due.shift(by);
     }
 
-    /// Takes new settings. `restart` or `stop` follows.
-    pub(crate) fn configure(&mut self, settings: &Settings) {
+    /// Takes settings. Returns whether they are new: `restart` or `stop` follows.
+    pub(crate) fn configure(&mut self, settings: &Settings) -> bool {
         let Settings { cob_id, period, overflow, .. } = *settings;
         let id = CobId::parse(cob_id).filter(|cob_id| cob_id.bit30).map(|cob_id| cob_id.id);
-        (self.period, self.overflow) = (if id.is_some() { period } else { 0 }, overflow);
-        self.id = id.unwrap_or(self.id);
+        let period = if id.is_some() { period } else { 0 };
+        let id = id.unwrap_or(self.id);
+        let is_new = (id, period, overflow) != (self.id, self.period, self.overflow);
+        (self.id, self.period, self.overflow) = (id, period, overflow);
+        is_new
     }
 
     /// The next SYNC is due at once, with the counter 1.

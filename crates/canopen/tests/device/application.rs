@@ -41,8 +41,10 @@ pub(crate) struct Numbers {
     /// The stored values: communication, application, calibration.
     pub(crate) stored: [Vec<u8>; 3],
     pub(crate) is_damaged: bool,
-    /// The groups that a write to 6201h stores.
+    /// The groups that a write to 6201h, or to another object, stores.
     pub(crate) stores: Option<Groups>,
+    /// The other object; 0 for none.
+    pub(crate) stored_at_once: u16,
     /// Why the memory accepts no job.
     pub(crate) is_full: Option<Abort>,
     /// The reports of the device about the groups that it loaded.
@@ -94,7 +96,7 @@ impl Application for Numbers {
     }
 
     fn stores(&self, entry: &Entry) -> Option<Groups> {
-        self.stores.filter(|_| entry.index() == 0x6201)
+        self.stores.filter(|_| entry.index() == 0x6201 || entry.index() == self.stored_at_once)
     }
 
     fn can_store(&self) -> Result<(), Abort> {

@@ -426,6 +426,23 @@ fn a_block_leaves_room_in_the_queue() {
     assert_eq!(client.block().len(), 100);
 }
 
+/// A client that gets no segment gives up.
+#[test]
+fn a_block_that_the_queue_never_takes_ends_with_the_time_out() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(700);
+    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 });
+    client.bench.out.room = 10;
+    client.request(Request::BlockUploadStart);
+    client.bench.take();
+    let mut responses = |ms| {
+        client.bench.run(Duration::from_millis(ms));
+        client.bench.sent().into_iter().filter(|(id, _)| *id == 0x585).collect::<Vec<_>>()
+    };
+    assert_eq!(responses(998), []);
+    assert_eq!(responses(3)[0].1[4..], 0x0504_0000_u32.to_le_bytes());
+}
+
 /// If a client pauses within a block, the server acknowledges the segments that have arrived; also in a later block of
 /// which only the first segment has arrived.
 #[test]

@@ -5,7 +5,7 @@ use canopen::indicators::BusHealth::{Good, Off, Searching, Warning};
 use canopen::indicators::Pattern::{self, Blinking, Flashes, Flickering, On};
 use canopen::indicators::{BusHealth, Indicators};
 use canopen::lss::Request;
-use canopen::{Duration, Frame};
+use canopen::{Duration, Frame, Instant};
 
 fn patterns(bench: &Bench, bus: BusHealth) -> (Pattern, Pattern) {
     let Indicators { run, error } = bench.device.indicators(bus);
@@ -70,4 +70,12 @@ fn error_shows_the_worst_of_several_errors() {
     assert_eq!(patterns(&bench, Good), (On, Flashes(2)));
     bench.receive(Frame::new(0x709, &[5]).unwrap());
     assert_eq!(patterns(&bench, Good), (On, Pattern::Off));
+}
+
+#[test]
+fn the_end_of_the_time_has_no_next_change() {
+    assert_eq!(Indicators::next_change(Instant::NEVER), Instant::NEVER);
+    let both = Indicators { run: Pattern::Flickering, error: Pattern::Flickering };
+    let [run, error] = both.levels(Instant::NEVER);
+    assert_ne!(run, error);
 }

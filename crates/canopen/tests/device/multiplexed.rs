@@ -1,6 +1,6 @@
 //! Multiplexed PDOs, in both directions and in both modes.
 
-use crate::bench::{Bench, DICTIONARY, ID};
+use crate::bench::{Bench, DICTIONARY, ID, Told};
 use canopen::Duration;
 use canopen::Frame;
 use canopen::sdo::Multiplexer;
@@ -298,4 +298,31 @@ fn reconfiguration_does_not_shorten_the_inhibit_time() {
     bench.nmt(0x80);
     bench.nmt(1);
     assert_eq!(bench.times_of(TPDO, Duration::from_millis(450)), [400_000]);
+}
+
+#[test]
+fn the_application_learns_of_a_value_that_is_taken() {
+    let mut bench = receiver(DESTINATION);
+    bench.told();
+    for (object, is_taken) in [(0x6200_u16, true), (0x6000, false)] {
+        let [low, high] = object.to_le_bytes();
+        bench.receive(Frame::new(RPDO, &[0x80 | ID, low, high, 0, 1, 0, 0, 0]).unwrap());
+        assert_eq!(bench.told().contains(&Told::Received(1)), is_taken, "{object:04X}h");
+    }
+}
+
+/// An RPDO whose deadline runs is not touched by a new line of the scanner list.
+#[test]
+fn a_write_to_the_scanner_list_leaves_other_pdos_alone() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+    bench.write(0x1600, 0, &[1]).unwrap();
+    bench.write(0x1400, 5, &[100, 0]).unwrap();
+    bench.write32(0x1400, 1, RPDO.into()).unwrap();
+    bench.nmt(1);
+    bench.receive(Frame::new(RPDO, &[1, 2]).unwrap());
+    bench.write32(0x1FA0, 1, 0).unwrap();
+    bench.take();
+    bench.run(Duration::from_millis(150));
+    assert_eq!(errors(&mut bench), [0x8250]);
 }

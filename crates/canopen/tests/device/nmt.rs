@@ -1,8 +1,9 @@
 //! NMT: commands, the services of each state, boot-up, start-up and error behaviour.
 
-use crate::bench::{Bench, DEVICE_FAULT, ID, SENSOR_BREAK, UNEXPECTED_RESET};
+use crate::bench::{Bench, DEVICE_FAULT, DICTIONARY, ID, SENSOR_BREAK, UNEXPECTED_RESET};
+use canopen::lss::{BitRate, Request};
 use canopen::nmt::State;
-use canopen::{Action, BusEvent, Duration, ErrorClass, Frame};
+use canopen::{Action, BusEvent, Duration, ErrorClass, Frame, NodeId};
 
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -337,7 +338,7 @@ fn nothing_precedes_the_boot_up_message() {
     type Ask = fn(&mut Bench);
     let asks: [Ask; 4] = [
         |bench| bench.nmt(1),
-        |bench| drop(bench.ask_raw([0x40, 0, 0x10, 0, 0, 0, 0, 0])),
+        |bench| _ = bench.ask_raw([0x40, 0, 0x10, 0, 0, 0, 0, 0]),
         |bench| bench.raise(0),
         |bench| bench.set_value(1, &[1]),
     ];
@@ -353,4 +354,70 @@ fn nothing_precedes_the_boot_up_message() {
         assert_eq!(bench.take().first().map(Frame::id), Some(0x705));
         assert_eq!(bench.device.state(), State::PreOperational);
     }
+}
+
+#[test]
+fn a_load_keeps_the_scope_of_the_reset() {
+    for (command, value) in [(0x82, [1, 2]), (0x81, [0, 0])] {
+        let mut bench = Bench::booted();
+        bench.write(0x6200, 0, &[1, 2]).unwrap();
+        bench.nmt(command);
+        bench.device.load();
+        bench.start();
+        assert_eq!(bench.read(0x6200, 0), Ok(value.to_vec()), "command {command:02X}h");
+    }
+}
+
+#[test]
+fn a_load_keeps_the_actions_that_wait() {
+    let mut bench = Bench::booted();
+    while bench.take_action().is_some() {}
+    let reset = Frame::new(0, &[0x81, ID]).unwrap();
+    let _ = bench.device.on_process_frame(&reset, bench.now, &mut bench.out);
+    bench.device.load();
+    assert_eq!(bench.take_action(), Some(Action::ResetNode));
+}
+
+#[test]
+fn a_load_uses_the_node_id_of_the_next_start() {
+    let mut bench = Bench::unstarted();
+    bench.device.set_node_id(NodeId::new(9));
+    bench.device.load();
+    assert_eq!(DICTIONARY.field(0x1014, 0).u32(bench.device.image()), 0x89);
+}
+
+/// The reset is handed over first, and the caller starts the device at once.
+#[test]
+fn a_start_keeps_the_change_of_the_bit_rate_that_is_due() {
+    let mut bench = Bench::booted();
+    while bench.take_action().is_some() {}
+    for request in [
+        Request::SwitchGlobal { configuration: true },
+        Request::BitTiming { table: 0, index: 2 },
+        Request::Activate { delay: 10 },
+    ] {
+        bench.receive(Frame::new(0x7E5, &request.encode()).unwrap());
+    }
+    bench.now = bench.now + Duration::from_millis(10);
+    let reset = Frame::new(0, &[0x82, ID]).unwrap();
+    let _ = bench.device.on_process_frame(&reset, bench.now, &mut bench.out);
+    let next = bench.device.poll_services(bench.now, &mut bench.out);
+    assert_eq!(next.action, Some(Action::ResetCommunication));
+    bench.start();
+    let actions: Vec<Action> = std::iter::from_fn(|| bench.take_action()).collect();
+    assert!(actions.contains(&Action::BitRate(BitRate::from_kbit(500).unwrap())), "{actions:?}");
+}
+
+/// The end of a job comes before the next poll.
+#[test]
+fn an_error_that_stops_the_device_ends_its_transfers() {
+    let mut bench = Bench::operational();
+    bench.write(0x1029, 1, &[2]).unwrap();
+    bench.bus(BusEvent::Recovered);
+    bench.take();
+    assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "the response waits for the job");
+    let _ = bench.device.error(ErrorClass::COMMUNICATION);
+    assert_eq!(bench.device.state(), State::Stopped);
+    let _ = bench.device.finish(Ok(()), bench.now, &mut bench.out);
+    assert!(bench.take().iter().all(|frame| frame.id() != 0x585));
 }

@@ -1,6 +1,7 @@
 //! Storage groups of the product: 1010h and 1011h from sub-index 4 on.
 
 use canopen::dictionary::{Access, Dictionary, Group, Groups, Object, Services, Type, check};
+use canopen::nmt::Command;
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Application, Device, Fault, Frame, Instant, Job, NodeId, Soundness, Stored, objects};
 
@@ -11,6 +12,7 @@ const ID: u8 = 5;
 const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(0), objects::error_register()],
     objects::emergency(),
+    [Object::new(0x1009, 0, "Variant", Type::Unsigned32, Access::ReadWrite).stored(Group::Application)],
     objects::identity(0, 1, 1),
     objects::store_parameters_with::<6>(&["Save recipes", "Save counters"]),
     objects::restore_parameters_with::<6>(&["Restore recipes", "Restore counters"]),
@@ -168,4 +170,17 @@ fn a_group_and_its_sub_index_go_together() {
     let error = std::panic::catch_unwind(move || check(&[row])).unwrap_err();
     let message = error.downcast_ref::<String>().map(String::as_str);
     assert_eq!(message, Some("2000h:0: 1010h has no sub-index for the storage group"));
+}
+
+#[test]
+fn a_reset_of_the_communication_leaves_a_low_index_of_another_group_alone() {
+    let mut node = node();
+    write(&mut node, 0x1009, &[1, 2, 3, 4]);
+    let mut sent = Sent::default();
+    let _ = node.nmt(Command::ResetCommunication, Instant(1), &mut sent);
+    start(&mut node);
+    assert_eq!(read(&mut node, 0x1009, 0), Ok(vec![1, 2, 3, 4]));
+    let _ = node.nmt(Command::ResetNode, Instant(1), &mut sent);
+    start(&mut node);
+    assert_eq!(read(&mut node, 0x1009, 0), Ok(vec![0; 4]));
 }

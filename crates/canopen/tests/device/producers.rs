@@ -3,7 +3,7 @@
 use canopen::dictionary::{Access, Dictionary, Mapping, Object, Services, Type};
 use canopen::nmt::{Command, State};
 use canopen::sdo::Multiplexer;
-use canopen::{Action, Application, Device, Frame, Instant, NodeId, TimeOfDay, objects};
+use canopen::{Action, Application, Device, Duration, Frame, Instant, NodeId, TimeOfDay, objects};
 
 use crate::exchange;
 use crate::types::Sent;
@@ -107,6 +107,25 @@ fn a_counter_begins_with_1_after_stopped() {
     let mut sent = Sent::default();
     let _ = node.nmt(Command::EnterPreOperational, Instant(46_000), &mut sent);
     assert_eq!(sent.0[0].data(), [1]);
+}
+
+#[test]
+fn a_write_that_changes_no_setting_of_the_producer_leaves_its_period_alone() {
+    for (index, value) in [(0x1007, 5000_u32), (0x1005, 0x4000_0080), (0x1006, 10_000)] {
+        let mut node = node();
+        assert_eq!(run(&mut node, (1, 5000), &[0x80]).len(), 1);
+        write(&mut node, index, &value.to_le_bytes(), 5000).unwrap();
+        let times: Vec<u64> = run(&mut node, (5000, 25_000), &[0x80]).iter().map(|(now, ..)| *now).collect();
+        assert_eq!(times, [10_001, 20_001], "{index:04X}h");
+    }
+}
+
+#[test]
+fn no_pause_is_possible_while_a_sync_is_due() {
+    let mut node = node();
+    assert_eq!(run(&mut node, (1, 5000), &[0x80]).len(), 1);
+    assert!(node.can_pause(Duration::from_millis(5), Instant(5000)));
+    assert!(!node.can_pause(Duration::from_millis(6), Instant(5000)));
 }
 
 #[test]

@@ -184,3 +184,15 @@ fn a_refused_preset_is_not_stored() {
     assert_eq!(bench.write(PRESET, 0, &[13]), Err(0x0609_0030), "by the application");
     assert_eq!((job(&mut bench), value(&bench)), (None, 0));
 }
+
+/// The setting has a job of its own.
+#[test]
+fn a_setting_that_the_application_would_store_too_begins_one_job() {
+    let mut bench = booted();
+    bench.device.application_mut().stored_at_once = 0x5F00;
+    request(&mut bench, [0x2F, 0, 0x5F, 0, 2, 0, 0, 0]);
+    assert_eq!(job(&mut bench), Some(Job::Setting(2)));
+    assert_eq!(finish(&mut bench, Ok(())), [[0x60, 0, 0x5F, 0, 0, 0, 0, 0]]);
+    assert_eq!(job(&mut bench), None);
+    assert_eq!(bench.write(0x6200, 0, &[0, 0]), Ok(()), "the next request is answered at once");
+}

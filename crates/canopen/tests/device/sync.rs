@@ -51,9 +51,47 @@ fn a_sync_of_the_wrong_length_is_an_error_and_no_sync() {
         bench.receive(Frame::new(0x80, data).unwrap());
         let frames = bench.take();
         assert!(frames.iter().all(|frame| frame.id() == 0x085));
-        assert_eq!(frames.len(), 2);
+        assert_eq!(frames.len(), 1);
         assert_eq!(frames[0].data()[..2], [0x40, 0x82]);
     }
+}
+
+#[test]
+fn syncs_of_the_wrong_length_are_one_error_until_a_right_one() {
+    for (counts, wrong, right) in [(true, &[1, 2][..], &[1][..]), (false, &[1], &[])] {
+        let mut bench = bench(1, 0, counts);
+        for _ in 0..100 {
+            bench.receive(Frame::new(0x80, wrong).unwrap());
+        }
+        assert_eq!(errors(&mut bench), [0x8240]);
+        bench.receive(Frame::new(0x80, right).unwrap());
+        assert_eq!(errors(&mut bench), [0]);
+        bench.receive(Frame::new(0x80, wrong).unwrap());
+        assert_eq!(errors(&mut bench), [0x8240]);
+        bench.write32(0x1005, 0, 0x81).unwrap();
+        assert_eq!(errors(&mut bench), [0], "a new CAN-ID");
+    }
+}
+
+/// The error codes of the EMCYs since the last call.
+fn errors(bench: &mut Bench) -> Vec<u16> {
+    let emcys = bench.sent().into_iter().filter(|(id, _)| *id == 0x085);
+    emcys.map(|(_, data)| u16::from_le_bytes([data[0], data[1]])).collect()
+}
+
+#[test]
+fn a_new_window_leaves_the_monitoring_of_the_period_alone() {
+    let mut bench = Bench::operational();
+    bench.write32(0x1006, 0, 10_000).unwrap();
+    bench.sync();
+    bench.take();
+    bench.write32(0x1007, 0, 5000).unwrap();
+    bench.run(Duration::from_millis(20));
+    assert_eq!(errors(&mut bench), [0x8100]);
+    bench.write32(0x1007, 0, 0).unwrap();
+    assert_eq!(errors(&mut bench), [], "the SYNC is still missing");
+    bench.sync();
+    assert_eq!(errors(&mut bench), [0]);
 }
 
 #[test]

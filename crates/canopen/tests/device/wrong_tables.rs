@@ -235,6 +235,12 @@ fn an_entry_that_could_not_work_does_not_compile() {
     let mut errors = objects::error_field::<4>();
     errors[0] = errors[0].stored(Group::Communication);
     assert_error(&[&errors], "1003h:0: an entry without a value in the image cannot be stored");
+    let relative =
+        Object::new(0x2000, 0, "", Type::Unsigned32, Access::ReadWrite).default(DefaultValue::NodeId(0x180));
+    let message = "2000h:0: a default with the node-ID belongs to the communication parameters";
+    assert_error(&[&[relative]], message);
+    assert_error(&[&[relative.stored(Group::Application)]], message);
+    assert_eq!(compile_error(&[&[relative.stored(Group::Communication)]]), None);
     let long = Object::new(0x2000, 0, "", Type::OctetString(200), Access::ReadWrite);
     assert_error(&[&[long]], "2000h:0: the string is longer than an SDO transfer can be");
 }
