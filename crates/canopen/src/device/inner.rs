@@ -173,12 +173,16 @@ impl<D: Definition> Inner<D> {
     }
 
     /// Changes the NMT state.
+    #[inline(never)]
     pub(super) fn enter(&mut self, state: State) {
         if state == self.state {
             return;
         }
         let had_services = self.state.has_services();
         (self.state, self.services_due) = (state, STALE);
+        if state == State::Initialising {
+            self.heartbeat = heartbeat::Producer::new();
+        }
         if Self::has(Services::SYNC_PRODUCER) && had_services != state.has_services() {
             self.restart_sync();
         }

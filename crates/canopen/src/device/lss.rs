@@ -125,24 +125,24 @@ impl LssSlave {
         }
     }
 
-    /// When the present delay of a change of the bit rate is over.
-    pub(super) fn switching_due(&self) -> Tick {
-        self.switching_due
-    }
-
-    /// Continues a change of the bit rate, at [`switching_due`](LssSlave::switching_due). Frames that were held back are
-    /// sent after the change. Returns the new bit rate when the bus changes to it.
+    /// Continues a change of the bit rate. Frames that were held back are sent after the change. Returns the new bit rate
+    /// when the bus changes to it.
     pub(super) fn poll_switching(
         &mut self,
         now: Tick,
         inner: &mut Inner<impl Definition>,
     ) -> Option<BitRate> {
+        if now < self.switching_due {
+            return None;
+        }
         let Switching::Before(switch) = self.switching else {
             (self.switching, self.switching_due) = (Switching::No, Tick::NEVER);
             return None;
         };
         inner.ask(Action::BitRate(switch.bit_rate));
-        (self.switching, self.switching_due) = (Switching::After, now.plus(switch.delay()));
+        let quiet_until = now.plus(switch.delay());
+        self.switching = Switching::After;
+        self.switching_due = if quiet_until > now { quiet_until } else { Tick::NEVER };
         Some(switch.bit_rate)
     }
 

@@ -272,30 +272,28 @@ impl<D: Definition> Device<D> {
 
     #[inline(never)]
     fn send_services(&mut self, now: Tick, out: &mut impl Transmit) {
-        // Both changes of a delay of 0 are due at once.
-        while D::Application::LSS && now >= self.services.lss.switching_due() {
-            if let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner) {
-                self.services.set_bus_bit_rate(bit_rate);
-            }
+        if D::Application::LSS
+            && let Some(bit_rate) = self.services.lss.poll_switching(now, &mut self.inner)
+        {
+            self.services.set_bus_bit_rate(bit_rate);
         }
         let context = &mut self.services.context(now, out);
         if D::Application::LSS {
             self.services.lss.poll(context);
         }
-        let id = self.inner.service(ERROR_CONTROL);
-        // Nothing precedes the boot-up message: the device is Initialising until the message is sent.
-        if self.inner.heartbeat.boots_up() {
-            self.inner.heartbeat.poll(id, State::Initialising, context);
-            if !self.inner.heartbeat.boots_up() {
-                self.inner.enter(State::PreOperational);
-            }
-        }
+        // A heartbeat follows the EMCY that gives the reason for a new state. Nothing precedes the boot-up message: the
+        // device is Initialising until the message is sent.
         if !self.inner.is_initialising() {
-            // A heartbeat follows the EMCY that gives the reason for a new state.
             self.inner.poll_errors(context);
-            self.inner.heartbeat.poll(id, self.inner.state, context);
-            self.silence_services();
         }
+        let boots_up = self.inner.heartbeat.boots_up();
+        let id = self.inner.service(ERROR_CONTROL);
+        self.inner.heartbeat.poll(id, self.inner.state, context);
+        if boots_up && !self.inner.heartbeat.boots_up() {
+            self.inner.enter(State::PreOperational);
+            self.inner.poll_errors(context);
+        }
+        self.silence_services();
         if self.inner.state.has_services() {
             let id = self.inner.service(SDO_RESPONSE);
             self.services.sdo.poll(id, &mut self.inner, context);
@@ -310,10 +308,11 @@ impl<D: Definition> Device<D> {
     fn next_service(&self) -> Tick {
         let (services, inner) = (&self.services, &self.inner);
         let lss = if D::Application::LSS { services.lss.due() } else { Tick::NEVER };
+        let due = lss.min(inner.heartbeat.due());
         if inner.is_initialising() {
-            return if inner.heartbeat.boots_up() { lss.min(inner.heartbeat.due()) } else { lss };
+            return due;
         }
-        let due = lss.min(inner.heartbeat.due()).min(self.inner.errors_due());
+        let due = due.min(self.inner.errors_due());
         // In a state without SDO there is no transfer, and none of these deadlines is set.
         services.more_sdo.as_ref().iter().fold(due.min(services.sdo.due()), |due, sdo| due.min(sdo.due()))
     }

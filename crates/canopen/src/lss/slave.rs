@@ -106,7 +106,7 @@ impl Slave {
             }
             request::IDENTIFY..=0x4B => {
                 let bound = command - request::IDENTIFY;
-                self.identify(bound, is_within(bound, value, &identity))
+                self.identify(bound, is_within(bound, value, identity(part_of(bound))))
             }
             request::IDENTIFY_UNCONFIGURED if self.is_unconfigured(node_id) => {
                 Outcome::Answer(response::UNCONFIGURED, 0)
@@ -143,20 +143,17 @@ impl Slave {
     }
 
     fn select(&mut self, part: u8, matches: bool) -> Outcome {
-        self.selected = advance(self.selected, part, matches && !self.is_selected);
-        if usize::from(self.selected) < Part::ALL.len() {
+        if !advance(&mut self.selected, part, matches && !self.is_selected, Part::ALL.len()) {
             return Outcome::Silence;
         }
-        (self.selected, self.is_selected) = (0, true);
+        self.is_selected = true;
         Outcome::Answer(response::SELECTED, 0)
     }
 
     fn identify(&mut self, bound: u8, matches: bool) -> Outcome {
-        self.identified = advance(self.identified, bound, matches);
-        if usize::from(self.identified) < Bound::ALL.len() {
+        if !advance(&mut self.identified, bound, matches, Bound::ALL.len()) {
             return Outcome::Silence;
         }
-        self.identified = 0;
         Outcome::Answer(response::IDENTIFIED, 0)
     }
 
@@ -187,18 +184,28 @@ impl Slave {
     }
 }
 
-/// Whether a value is the vendor-ID or the product code, or a bound of the revision or the serial number that includes
-/// the own one. The bounds have the order of [`Bound::ALL`].
-fn is_within(bound: u8, value: u32, identity: impl Fn(u8) -> u32) -> bool {
+/// The part of the identity to which a bound belongs. The bounds have the order of [`Bound::ALL`].
+fn part_of(bound: u8) -> u8 {
+    if bound < 2 { bound } else { bound / 2 + 1 }
+}
+
+/// Whether a value is the own vendor-ID or product code, or a bound of the revision or the serial number that includes
+/// the own one.
+fn is_within(bound: u8, value: u32, own: u32) -> bool {
     match bound {
-        0 | 1 => value == identity(bound),
-        2 | 4 => value <= identity(bound / 2 + 1),
-        _ => value >= identity(bound / 2 + 1),
+        0 | 1 => value == own,
+        2 | 4 => value <= own,
+        _ => value >= own,
     }
 }
 
 /// Counts the messages of a series. Each must arrive in order and match; the first message always restarts the series.
-fn advance(done: u8, number: u8, matches: bool) -> u8 {
-    let is_in_turn = number == 0 || number == done;
-    if is_in_turn && matches { number.saturating_add(1) } else { 0 }
+/// Returns whether the series is complete.
+#[inline(never)] // Two callers.
+fn advance(done: &mut u8, number: u8, matches: bool, all: usize) -> bool {
+    let is_in_turn = number == 0 || number == *done;
+    let next = if is_in_turn && matches { number.saturating_add(1) } else { 0 };
+    let is_complete = usize::from(next) == all;
+    *done = if is_complete { 0 } else { next };
+    is_complete
 }
