@@ -1,7 +1,9 @@
 //! Tests with data sheets of vendors.
 
 use canopen::NodeId;
-use eds::{Access, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Value};
+use eds::{
+    Access, Commissioning, DEVICES, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Reals, Value,
+};
 
 /// A sheet with all deviations that the reader accepts.
 const ODD: &str = "\u{FEFF}; a comment\r
@@ -189,14 +191,35 @@ fn a_mistake_of_a_vendor_is_a_warning_and_the_rest_is_read() {
 #[test]
 fn an_entry_whose_value_cannot_be_read_has_no_value() {
     for (line, value) in
-        [("ParameterValue=7x0", None), ("ParameterValue=70000", None), ("ParameterValue=", integer(5))]
+        [("7x0", None), ("70000", None), ("-5", None), ("", integer(5))]
     {
-        let text = format!("[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\n{line}");
+        let text = format!("[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\nParameterValue={line}");
         let eds = Eds::parse(&text).unwrap();
         let entry = get(&eds, 0x2001, 0);
         assert_eq!(entry.value.clone().or(entry.default.clone()), value, "{line}");
-        assert_eq!(eds.warnings.len(), usize::from(value.is_none()), "{line}: {:?}", eds.warnings);
+        let words = format!("line 6: [2001] ParameterValue: \"{line}\" is not a value of UNSIGNED16, 0 to 65535; the value is left out");
+        let warnings: Vec<String> = eds.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(warnings, value.map_or(vec![words], |_| Vec::new()));
+        assert!(eds.warnings.iter().all(eds::Error::is_loss));
     }
+}
+
+/// A configuration file that is cut at any line tells that a part of it is missing.
+#[test]
+fn a_truncated_file_has_a_gap() {
+    let mut sheet = DEVICES[0].eds().clone();
+    sheet.commissioning = Some(Commissioning::default());
+    let text = sheet.to_dcf("a.dcf", Reals::Decimal);
+    assert_eq!(Eds::parse(&text).unwrap().warnings, []);
+    let first = text.find("[MandatoryObjects]").unwrap();
+    let last = text.rfind("\n[").unwrap();
+    for (end, _) in text[..last].match_indices('\n').filter(|(at, _)| *at > first) {
+        let cut = Eds::parse(&text[..end]).unwrap();
+        assert!(cut.warnings.iter().any(eds::Error::is_loss), "{}", &text[end - 80..end]);
+    }
+    let cut = Eds::parse(text.split("[1018]").next().unwrap()).unwrap();
+    let words: Vec<String> = cut.warnings.iter().map(ToString::to_string).collect();
+    assert!(words.iter().any(|words| words.ends_with("1018h is listed and has no section")), "{words:?}");
 }
 
 #[test]
