@@ -202,6 +202,15 @@ fn monitor_takes_pdos_and_reads_the_rest() {
     );
 }
 
+#[test]
+fn monitor_tells_the_meaning_of_a_status() {
+    let wire = Wire::new(Pressure::new(1));
+    let line = printed(&wire, &["monitor", "--count", "1", "6150:1"]);
+    assert!(line.contains("6150h:1") && line.trim_end().ends_with(" [valid]"), "{line}");
+    let line = printed(&wire, &["--json", "monitor", "--count", "1", "6150:1"]);
+    assert!(line.contains("\"meaning\":\"valid\""), "{line}");
+}
+
 /// A new lift unit has no virtual device and sends nothing. This command gives it all virtual devices. No measurement
 /// is made in the test, so the unit knows of no button.
 const ALL_DEVICES: &[&str] = &["write", "--node", "16", "2305", "15"];
