@@ -205,7 +205,10 @@ pub(crate) fn value(section: Section, key: &'static str, text: &str, data_type: 
     read(text).or_else(|| {
         let (value, text, expected) = (repaired(text, read), text.to_owned(), expected(data_type));
         let is_read = value.is_some();
-        section.warn(key, if is_read { Problem::Value { text, expected } } else { Problem::NoValue { text, expected } });
+        section.warn(
+            key,
+            if is_read { Problem::Value { text, expected } } else { Problem::NoValue { text, expected } },
+        );
         value
     })
 }

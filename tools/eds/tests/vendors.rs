@@ -141,7 +141,7 @@ fn missing_keys_are_named_with_the_line_of_their_section() {
 #[test]
 fn values_are_checked_against_their_type() {
     let error = object("ParameterName=X\nDataType=5\nAccessType=rw\nDefaultValue=256\n");
-    assert_eq!(error.to_string(), "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8");
+    assert_eq!(error.to_string(), "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8, 0 to 255; the value is left out");
     let error = object("ParameterName=X\nDataType=5\nAccessType=wr\n");
     assert!(error.to_string().ends_with("\"wr\" is not one of ro, wo, rw, rwr, rww and const"), "{error}");
     let error = object("ParameterName=X\nObjectType=4\nDataType=5\nAccessType=rw\n");
@@ -152,7 +152,7 @@ fn values_are_checked_against_their_type() {
 fn a_compact_value_is_checked_in_its_own_section() {
     let lines = "ParameterName=X\nDataType=5\nAccessType=rw\nCompactSubObj=2\n[2001Value]\n1=300\n";
     let error = object(lines);
-    assert_eq!(error.to_string(), "line 8: [2001value]: \"300\" is not a value of UNSIGNED8");
+    assert_eq!(error.to_string(), "line 8: [2001value]: \"300\" is not a value of UNSIGNED8, 0 to 255; the value is left out");
 }
 
 #[test]
@@ -190,14 +190,16 @@ fn a_mistake_of_a_vendor_is_a_warning_and_the_rest_is_read() {
 /// A configuration with such an entry would write the default, which its author did not ask for.
 #[test]
 fn an_entry_whose_value_cannot_be_read_has_no_value() {
-    for (line, value) in
-        [("7x0", None), ("70000", None), ("-5", None), ("", integer(5))]
-    {
-        let text = format!("[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\nParameterValue={line}");
+    for (line, value) in [("7x0", None), ("70000", None), ("-5", None), ("", integer(5))] {
+        let text = format!(
+            "[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\nParameterValue={line}"
+        );
         let eds = Eds::parse(&text).unwrap();
         let entry = get(&eds, 0x2001, 0);
         assert_eq!(entry.value.clone().or(entry.default.clone()), value, "{line}");
-        let words = format!("line 6: [2001] ParameterValue: \"{line}\" is not a value of UNSIGNED16, 0 to 65535; the value is left out");
+        let words = format!(
+            "line 6: [2001] ParameterValue: \"{line}\" is not a value of UNSIGNED16, 0 to 65535; the value is left out"
+        );
         let warnings: Vec<String> = eds.warnings.iter().map(ToString::to_string).collect();
         assert_eq!(warnings, value.map_or(vec![words], |_| Vec::new()));
         assert!(eds.warnings.iter().all(eds::Error::is_loss));

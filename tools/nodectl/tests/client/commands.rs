@@ -66,11 +66,9 @@ fn a_lost_bus_is_not_a_silent_node() {
 #[test]
 fn a_silent_node_is_told_for_each_command_of_its_program() {
     let wire = Wire::new(vec![Loader::new(1, b"1.0.0\n")]);
-    for line in [
-        &["confirm", "-n", "9"][..],
-        &["rollback", "-n", "9"],
-        &["update", "--raw", "Cargo.toml", "-n", "9"],
-    ] {
+    for line in
+        [&["confirm", "-n", "9"][..], &["rollback", "-n", "9"], &["update", "--raw", "Cargo.toml", "-n", "9"]]
+    {
         let (code, text) = failed(&wire, line);
         assert_eq!((code, text.contains("node 9 is silent: is it on")), (3, true), "{text}");
     }

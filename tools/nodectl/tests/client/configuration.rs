@@ -108,7 +108,8 @@ fn a_damaged_file_is_not_applied() {
     printed(&wire, &["write", "1017", "1000"]);
     let cut = whole.split_once("[6124]").expect("6124h").0.to_owned();
     let wrong = whole.replace("ParameterValue=250\r\n", "ParameterValue=-5\r\n");
-    let expected = "[1017] ParameterValue: \"-5\" is not a value of UNSIGNED16, 0 to 65535; the value is left out";
+    let expected =
+        "[1017] ParameterValue: \"-5\" is not a value of UNSIGNED16, 0 to 65535; the value is left out";
     for (damaged, words) in [(cut, "6124h is listed and has no section"), (wrong, expected)] {
         std::fs::write(&file, &damaged).expect("a file");
         for line in [&["apply", &file][..], &["apply", &file, "--dry-run"]] {
@@ -136,7 +137,8 @@ fn only_end_values_are_reported_as_different() {
     };
     let (value, rest) = after.split_once("ParameterValue=").expect("a value");
     let rest = rest.split_once('\r').expect("a line").1;
-    std::fs::write(&file, format!("{before}[1A00sub1]{value}ParameterValue=0x10180120\r{rest}")).expect("a file");
+    std::fs::write(&file, format!("{before}[1A00sub1]{value}ParameterValue=0x10180120\r{rest}"))
+        .expect("a file");
     let (code, text) = failed(&wire, &["apply", &file]);
     assert_eq!(code, 1, "{text}");
     assert!(text.contains("1A00h:1 is ") && text.contains(" instead of 270008608 "), "{text}");

@@ -185,7 +185,11 @@ fn a_mistake_at_the_last_node_changes_no_node() {
     let folder = corpus("");
     let line = ["net", "apply", path.to_str().unwrap(), "--eds", folder.to_str().unwrap()];
     let (code, text) = failed(&wire, &line);
-    assert_eq!((code, text.contains("node 3: 6FFFh:0 is no object that the data sheet lets write")), (7, true), "{text}");
+    assert_eq!(
+        (code, text.contains("node 3: 6FFFh:0 is no object that the data sheet lets write")),
+        (7, true),
+        "{text}"
+    );
     wire.station(|nodes| {
         assert!(nodes.iter().all(|node| node.state() == canopen::nmt::State::Operational));
     });

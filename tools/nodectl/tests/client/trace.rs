@@ -31,7 +31,7 @@ fn texts(frames: &[(u16, &[u8])]) -> Vec<String> {
 fn a_pdo_of_a_lift_tells_no_node() {
     let mut decoder = Decoder::default();
     let position = Frame::new(0x18C, &[0; 4]).expect("a frame");
-    let mut node = |decoder: &mut Decoder| decoder.on_frame(&position, Instant(0))[0].node.map(NodeId::get);
+    let node = |decoder: &mut Decoder| decoder.on_frame(&position, Instant(0))[0].node.map(NodeId::get);
     assert_eq!(node(&mut decoder), Some(12));
     let sheet = Catalogue::of_file("lift.eds").expect("a data sheet");
     decoder.know(NodeId::new(33).expect("a node-ID"), Knowledge::new(sheet));
