@@ -12,7 +12,8 @@ const LISTS: [&str; 3] = ["mandatoryobjects", "optionalobjects", "manufacturerob
 
 /// Warns of each missing part. A file without any list is one of a vendor that writes none.
 pub(crate) fn warn(ini: &Ini, objects: &BTreeMap<u16, Object>) {
-    let lists = LISTS.map(|name| (name, ini.section(name)));
+    let whole = |list: &Section| list.get("SupportedObjects").is_some();
+    let lists = LISTS.map(|name| (name, ini.section(name).filter(whole)));
     if lists.iter().any(|(_, list)| list.is_some()) {
         for (name, list) in lists {
             match list {
