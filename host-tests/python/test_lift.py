@@ -1,6 +1,8 @@
 """The data sheet of the lift node in a stock CANopen master: each pre-defined PDO has its COB-ID and its mapping."""
 
 import csv
+import os
+import subprocess
 from pathlib import Path
 
 import canopen
@@ -84,6 +86,11 @@ def test_a_master_reads_what_the_node_sends():
         assert position.map[0].raw == 0
         # Half a revolution of a wheel of 200 mm.
         simulator.command(f"shaft {NODE_ID}=ramp:0,0.5,0.2")
+        # The CAN-ID of the position is not that of TPDO 1 of a node 12.
+        bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+        scan = [os.environ["NODECTL_COMMAND"], "--bus", bus, "scan"]
+        found = subprocess.run(scan, capture_output=True, text=True, check=True)
+        assert "node 8" not in found.stderr and "node 12" not in found.stderr
         while position.map[0].raw != 100:
             assert position.wait_for_reception(PATIENCE) is not None
     finally:

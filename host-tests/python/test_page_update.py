@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from page import Page, Server
+from selenium.common.exceptions import JavascriptException
 from simulator import Simulator
 from test_update import identification, image
 
@@ -16,6 +17,14 @@ def checked(page: Page, file: Path) -> str:
 
 def may_start(page: Page) -> bool:
     return page.script("return [...document.querySelectorAll('#view-update button')].some((button) => !button.disabled)")
+
+
+def is_refused(page: Page, node: int | str) -> bool:
+    try:
+        page.request("nmt", node=node, command="preop")
+    except JavascriptException as refused:
+        return "node 1 is being updated" in str(refused)
+    return False
 
 
 def runs(page: Page, program: Path) -> bool:
@@ -41,6 +50,7 @@ def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path, driver):
         page.script("document.querySelector('#view-update .outcome').textContent = ''")
         assert "the program fits" in checked(page, b)
         page.press("Update the node")
+        page.until(lambda: is_refused(page, node=1) and is_refused(page, node="all"), "refuse NMT commands during the update")
         page.says("#view-update .outcome", f"is now version 0.1.0, identification {identification(b):08X}h")
         page.until(lambda: runs(page, b), "read the identification of B in the node")
         assert f"{identification(b):08X}h" in page.says("#view-update .programs", "on trial")

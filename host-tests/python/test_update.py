@@ -8,6 +8,7 @@ import json
 import os
 import re
 import shlex
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -115,6 +116,32 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
     assert [entry["version"] for entry in program["log"]] == ["0.1.0", "0.1.0", "0.2.0", "0.2.0"]
     assert (program["sector_erases"], program["clears_allowed"]) == (6, 48)
     assert simulator.quit()["bus"]["errors"] == 0
+
+
+def test_an_update_that_is_interrupted_in_its_check_is_ended_by_the_next_run(simulator: Simulator, tmp_path: Path):
+    """The node checks the program on its own. The next run finds it on trial in the bootloader, starts it, and confirms it."""
+    b = image(tmp_path / "b.img", "0.2.0")
+    c = Path(os.environ["NODE_IMAGES"]) / "firmware.img"
+    bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+    line = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", "1", "update"]
+
+    def interrupt() -> None:
+        with subprocess.Popen([*line, b], stderr=subprocess.PIPE, text=True) as run:
+            for step in run.stderr:
+                if "verify" in step:
+                    run.send_signal(signal.SIGINT)
+        assert run.returncode == -signal.SIGINT
+
+    interrupt()
+    report = nodectl(simulator, "update", b)
+    assert (report["result"], report["new_identification"], report["on_trial"]) == ("updated", identification(b), False)
+    # Another program is not taken for that of the file.
+    assert nodectl(simulator, "update", c)["result"] == "updated"
+    interrupt()
+    refused = subprocess.run([*line, c], capture_output=True, text=True, check=False)
+    assert refused.returncode == 6, refused.stderr
+    assert "its program is on trial" in refused.stderr
+    assert nodectl(simulator, "confirm")["identification"] == identification(b)
 
 
 def test_the_holder_of_its_key_opens_a_node_with_the_standard_library():

@@ -11,8 +11,8 @@ use crate::{Eds, Reals};
 pub struct Commissioning {
     /// The node-ID.
     pub node_id: u8,
-    /// The bit rate in kbit/s.
-    pub bit_rate: u16,
+    /// The bit rate in kbit/s; `None` where it is not known.
+    pub bit_rate: Option<u16>,
     /// The serial number, 1018h:4.
     pub serial: u32,
 }
@@ -39,7 +39,7 @@ impl Eds {
         let Commissioning { node_id, bit_rate, serial } = self.commissioning.unwrap_or_default();
         out.section("DeviceComissioning", "")?;
         out.key("NodeID", node_id)?;
-        out.key("Baudrate", bit_rate)?;
+        bit_rate.iter().try_for_each(|rate| out.key("Baudrate", rate))?;
         out.key("NetNumber", 0)?;
         out.key("CANopenManager", 0)?;
         out.key("LSS_SerialNumber", format_args!("0x{serial:08X}"))?;

@@ -33,12 +33,50 @@ pub enum Problem {
         /// The kind of value that is expected.
         expected: String,
     },
+    /// A value that is not of its type, and of which no part can be read.
+    #[error("\"{text}\" is not {expected}; the value is left out")]
+    NoValue {
+        /// The value.
+        text: String,
+        /// The kind of value that is expected.
+        expected: String,
+    },
     /// A sub-index whose index has no section.
     #[error("the object has no section of its own")]
     Orphan,
+    /// A listed object whose index has no section.
+    #[error("{first:04X}h is listed and has no section{}", and_more(*.more))]
+    NoObject {
+        /// The first such object.
+        first: u16,
+        /// The number of others.
+        more: usize,
+    },
+    /// Fewer objects or sub-indices than the file counts.
+    #[error("{counted} are counted and {found} are there")]
+    Fewer {
+        /// The number that the file tells.
+        counted: usize,
+        /// The number in the file.
+        found: usize,
+    },
+    /// A missing list of objects, beside other lists.
+    #[error("the list of objects is missing")]
+    NoList,
 }
 
 impl Error {
+    /// Whether a configuration out of this file is incomplete: a part of the file is missing, as of a truncated one, or the
+    /// value of a parameter cannot be read.
+    #[must_use]
+    pub fn is_loss(&self) -> bool {
+        match self.problem {
+            Problem::NoObject { .. } | Problem::Fewer { .. } | Problem::NoList => true,
+            Problem::NoValue { .. } => self.key == "ParameterValue",
+            _ => false,
+        }
+    }
+
     fn place(&self) -> String {
         let Error { section, key, line, .. } = self;
         let line = line.map(|line| format!("line {line}: ")).unwrap_or_default();
@@ -48,4 +86,8 @@ impl Error {
             (false, false) => format!("{line}[{section}] {key}: "),
         }
     }
+}
+
+fn and_more(count: usize) -> String {
+    if count == 0 { String::new() } else { format!(", and {count} more") }
 }

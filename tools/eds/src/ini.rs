@@ -26,10 +26,10 @@ impl<'a> Ini<'a> {
         }
     }
 
-    /// The warnings so far, each once, in the order of the file.
+    /// The warnings so far, each once, in the order of the file. Those about missing sections come last.
     pub(crate) fn into_warnings(self) -> Vec<Error> {
         let mut warnings = self.warnings.into_inner();
-        warnings.sort_by_key(|warning| warning.line);
+        warnings.sort_by_key(|warning| (warning.line.is_none(), warning.line));
         warnings.dedup();
         warnings
     }
@@ -37,6 +37,12 @@ impl<'a> Ini<'a> {
     /// All sections, in the order of the file.
     pub(crate) fn sections(&self) -> impl Iterator<Item = Section<'_>> {
         self.parser.get_map_ref().keys().map(|name| Section { ini: self, name })
+    }
+
+    /// A warning: a section is missing.
+    pub(crate) fn warn_of(&self, section: &str, problem: Problem) {
+        let warning = Error { section: section.into(), key: "", line: None, problem };
+        self.warnings.borrow_mut().push(warning);
     }
 
     /// A section by its name in lower case.

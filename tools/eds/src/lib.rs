@@ -12,6 +12,7 @@ mod device;
 mod edition;
 mod error;
 mod find;
+mod gaps;
 mod generated;
 mod ini;
 mod model;

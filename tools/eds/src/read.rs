@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use canopen::eds::BIT_RATES;
 
 use crate::ini::{Ini, Section};
-use crate::value::repaired;
+use crate::value::{expected, repaired};
 use crate::{
     Access, Commissioning, DataType, DeviceInfo, Eds, Entry, Error, Flags, Formula, Object, ObjectType,
-    Problem, compact,
+    Problem, compact, gaps,
 };
 
 /// The keys of the bit rates, in their order.
@@ -24,7 +24,7 @@ const RATE_KEYS: [&str; BIT_RATES.len()] = [
 ];
 
 /// Smaller indices are data types, which some editors write as objects.
-const FIRST_OBJECT: u16 = 0x1000;
+pub(crate) const FIRST_OBJECT: u16 = 0x1000;
 
 impl Eds {
     /// Reads a data sheet (EDS) or a configuration file (DCF) of any vendor.
@@ -50,6 +50,7 @@ impl Eds {
                 object.entries.insert(sub, entry(section, index, sub));
             }
         }
+        gaps::warn(&ini, &objects);
         // CiA 306 spells this name with one m; some vendors write two.
         let commissioning = ini.section("devicecomissioning").or_else(|| ini.section("devicecommissioning"));
         let commissioning = commissioning.map(self::commissioning);
@@ -107,7 +108,7 @@ fn device_info(section: Section) -> DeviceInfo {
 fn commissioning(section: Section) -> Commissioning {
     Commissioning {
         node_id: section.number("NodeID"),
-        bit_rate: section.number("Baudrate"),
+        bit_rate: Some(section.number("Baudrate")).filter(|rate| *rate != 0),
         serial: section.number("LSS_SerialNumber"),
     }
 }
@@ -202,7 +203,12 @@ fn formula(section: Section, key: &'static str, data_type: DataType) -> Option<F
 pub(crate) fn value(section: Section, key: &'static str, text: &str, data_type: DataType) -> Option<Formula> {
     let read = |text: &str| Formula::parse(text, data_type);
     read(text).or_else(|| {
-        section.wrong(key, text, format!("a value of {data_type}"));
-        repaired(text, read)
+        let (value, text, expected) = (repaired(text, read), text.to_owned(), expected(data_type));
+        let is_read = value.is_some();
+        section.warn(
+            key,
+            if is_read { Problem::Value { text, expected } } else { Problem::NoValue { text, expected } },
+        );
+        value
     })
 }

@@ -132,10 +132,19 @@ fn signed(value: i128, bits: u8) -> Option<i128> {
 fn unsigned(value: i128, bits: u8) -> Option<i128> {
     let end = 1_i128 << bits;
     match value {
-        _ if value >= end || value < -(end / 2) => None,
-        _ if value < 0 => Some(value + end),
-        _ => Some(value),
+        -1 if bits > 1 => Some(end - 1),
+        _ => (0..end).contains(&value).then_some(value),
     }
+}
+
+/// What a text of a data type must be, with the range of an integer.
+pub(crate) fn expected(data_type: DataType) -> String {
+    let range = match data_type.class() {
+        Class::Signed(bits) => format!(", {} to {}", -(1_i128 << (bits - 1)), (1_i128 << (bits - 1)) - 1),
+        Class::Unsigned(bits) => format!(", 0 to {}", (1_i128 << bits) - 1),
+        Class::Real(_) | Class::Text | Class::Bytes => String::new(),
+    };
+    format!("a value of {data_type}{range}")
 }
 
 /// A real number: a decimal number, or the bits after `0x`.
@@ -195,7 +204,13 @@ mod tests {
         {
             assert_eq!(Formula::parse(text, data_type), constant(value), "{text}");
         }
-        for (text, data_type) in [("256", INTEGER8), ("-129", INTEGER8), ("0x100000000", UNSIGNED32)] {
+        for (text, data_type) in [
+            ("256", INTEGER8),
+            ("-129", INTEGER8),
+            ("0x100000000", UNSIGNED32),
+            ("-2", UNSIGNED32),
+            ("-5", DataType(6)),
+        ] {
             assert_eq!(Formula::parse(text, data_type), None, "{text}");
         }
     }

@@ -1,7 +1,9 @@
 //! Tests with data sheets of vendors.
 
 use canopen::NodeId;
-use eds::{Access, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Value};
+use eds::{
+    Access, Commissioning, DEVICES, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Reals, Value,
+};
 
 /// A sheet with all deviations that the reader accepts.
 const ODD: &str = "\u{FEFF}; a comment\r
@@ -139,7 +141,10 @@ fn missing_keys_are_named_with_the_line_of_their_section() {
 #[test]
 fn values_are_checked_against_their_type() {
     let error = object("ParameterName=X\nDataType=5\nAccessType=rw\nDefaultValue=256\n");
-    assert_eq!(error.to_string(), "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8");
+    assert_eq!(
+        error.to_string(),
+        "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8, 0 to 255; the value is left out"
+    );
     let error = object("ParameterName=X\nDataType=5\nAccessType=wr\n");
     assert!(error.to_string().ends_with("\"wr\" is not one of ro, wo, rw, rwr, rww and const"), "{error}");
     let error = object("ParameterName=X\nObjectType=4\nDataType=5\nAccessType=rw\n");
@@ -150,7 +155,10 @@ fn values_are_checked_against_their_type() {
 fn a_compact_value_is_checked_in_its_own_section() {
     let lines = "ParameterName=X\nDataType=5\nAccessType=rw\nCompactSubObj=2\n[2001Value]\n1=300\n";
     let error = object(lines);
-    assert_eq!(error.to_string(), "line 8: [2001value]: \"300\" is not a value of UNSIGNED8");
+    assert_eq!(
+        error.to_string(),
+        "line 8: [2001value]: \"300\" is not a value of UNSIGNED8, 0 to 255; the value is left out"
+    );
 }
 
 #[test]
@@ -188,15 +196,37 @@ fn a_mistake_of_a_vendor_is_a_warning_and_the_rest_is_read() {
 /// A configuration with such an entry would write the default, which its author did not ask for.
 #[test]
 fn an_entry_whose_value_cannot_be_read_has_no_value() {
-    for (line, value) in
-        [("ParameterValue=7x0", None), ("ParameterValue=70000", None), ("ParameterValue=", integer(5))]
-    {
-        let text = format!("[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\n{line}");
+    for (line, value) in [("7x0", None), ("70000", None), ("-5", None), ("", integer(5))] {
+        let text = format!(
+            "[2001]\nParameterName=X\nDataType=6\nAccessType=rw\nDefaultValue=5\nParameterValue={line}"
+        );
         let eds = Eds::parse(&text).unwrap();
         let entry = get(&eds, 0x2001, 0);
         assert_eq!(entry.value.clone().or(entry.default.clone()), value, "{line}");
-        assert_eq!(eds.warnings.len(), usize::from(value.is_none()), "{line}: {:?}", eds.warnings);
+        let words = format!(
+            "line 6: [2001] ParameterValue: \"{line}\" is not a value of UNSIGNED16, 0 to 65535; the value is left out"
+        );
+        let warnings: Vec<String> = eds.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(warnings, value.map_or(vec![words], |_| Vec::new()));
+        assert!(eds.warnings.iter().all(eds::Error::is_loss));
     }
+}
+
+/// A configuration file that is cut before any section tells that a part of it is missing.
+#[test]
+fn a_truncated_file_has_a_gap() {
+    let mut sheet = DEVICES[0].eds().clone();
+    sheet.commissioning = Some(Commissioning::default());
+    let text = sheet.to_dcf("a.dcf", Reals::Decimal);
+    assert_eq!(Eds::parse(&text).unwrap().warnings, []);
+    let first = text.find("[MandatoryObjects]").unwrap();
+    for (end, _) in text.match_indices("\n[").filter(|(end, _)| *end > first).step_by(7) {
+        let cut = Eds::parse(&text[..end]).unwrap();
+        assert!(cut.warnings.iter().any(eds::Error::is_loss), "{}", &text[end - 80..end + 40]);
+    }
+    let cut = Eds::parse(text.split("[1018]").next().unwrap()).unwrap();
+    let words: Vec<String> = cut.warnings.iter().map(ToString::to_string).collect();
+    assert!(words.iter().any(|words| words.ends_with("1018h is listed and has no section")), "{words:?}");
 }
 
 #[test]

@@ -149,6 +149,15 @@ impl Catalogue {
             && !limit(&entry.high).is_some_and(|high| value > high)
     }
 
+    /// The device type in the data sheet (default of 1000h).
+    #[must_use]
+    pub fn device_type(&self) -> Option<u32> {
+        match self.sheet.get(0x1000, 0)?.default {
+            Some(eds::Formula::Constant(eds::Value::Integer(value))) => u32::try_from(value).ok(),
+            _ => None,
+        }
+    }
+
     /// All entries of the data sheet; without one, the entries of the communication profile.
     pub fn entries(&self) -> impl Iterator<Item = &Entry> {
         self.sheet.entries()

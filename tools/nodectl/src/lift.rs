@@ -10,6 +10,21 @@ use crate::Catalogue;
 use crate::object::at;
 use crate::value::Value;
 
+/// The device profile of a lift (1000h).
+const PROFILE: u32 = 417;
+
+/// Whether a device type (1000h) is that of a lift.
+#[must_use]
+pub fn is_lift(device_type: u32) -> bool {
+    device_type & 0xFFFF == PROFILE
+}
+
+/// Whether CiA 417 fixes this CAN-ID, so that it does not tell the node that sends with it.
+#[must_use]
+pub fn is_fixed(can_id: u16) -> bool {
+    by_cob_id(can_id.into()).is_some_and(|definition| definition.producer.is_none())
+}
+
 /// A value in a PDO.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
@@ -134,6 +149,12 @@ mod tests {
         assert_eq!(readings(0x510, &[0x80, 0x83, 0x63, 2, 1, 1, 0, 0]), texts(&[("position 2", "257")]));
         assert_eq!(readings(0x510, &[0x80, 0, 0x50, 0, 1, 0, 0, 0]), texts(&[("", "01 00 00 00")]));
         assert_eq!(readings(0x510, &[0x80, 0x83]), []);
+    }
+
+    #[test]
+    fn a_fixed_can_id_tells_no_node() {
+        assert!(is_fixed(0x18C) && is_lift(0x0000_01A1));
+        assert!(!is_fixed(0x510) && !is_fixed(0x701) && !is_lift(0x0002_0194));
     }
 
     #[test]

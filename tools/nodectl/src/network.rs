@@ -10,6 +10,7 @@ use canopen::nmt::State;
 use canopen::{Duration, Frame, Instant, NodeId};
 
 use crate::bus::{Bus, BusError, Received};
+use crate::lift::is_fixed;
 use crate::other_clients::OtherClients;
 use crate::sdo::Channel;
 use crate::steadiness::Steadiness;
@@ -49,6 +50,8 @@ pub struct Logged {
 pub struct Heard {
     /// The state in the newest heartbeat or boot-up message; `None` without one.
     pub state: Option<State>,
+    /// Whether a message has come that no lift device of another node-ID sends: the CAN-IDs of CiA 417 are fixed.
+    pub is_sure: bool,
 }
 
 /// Whether a transfer may begin.
@@ -241,6 +244,11 @@ impl Network {
         }
     }
 
+    /// Whether another client has sent a request on the SDO channel of a node since an instant.
+    pub(crate) fn has_other_request_since(&self, node: NodeId, begin: Instant) -> bool {
+        self.others.has_asked_since(node, begin)
+    }
+
     /// Begins a log of all frames, sent and received. A former log is dropped.
     pub fn begin_log(&mut self) {
         self.log = Some(Vec::new());
@@ -383,6 +391,7 @@ impl Network {
             || (matches!(id, 0x701..=0x77F) && !frame.is_remote());
         if let Some(node) = node.filter(|_| is_sender) {
             let heard = self.heard.entry(node).or_default();
+            heard.is_sure |= !is_fixed(id);
             heard.state = Heartbeat::parse(frame).map(|heartbeat| heartbeat.state).or(heard.state);
         }
     }

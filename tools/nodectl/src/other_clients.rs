@@ -119,6 +119,11 @@ impl OtherClients {
         self.servers(node).heard.get(&node).is_some_and(|heard| heard.answer >= begin)
     }
 
+    /// Whether another client has sent a request on that channel since an instant.
+    pub(crate) fn has_asked_since(&self, node: NodeId, begin: Instant) -> bool {
+        self.servers(node).heard.get(&node).is_some_and(|heard| heard.request >= begin)
+    }
+
     /// The time since the newest request of another client to a node; `None` where there was none.
     pub(crate) fn since_request(&self, node: NodeId, now: Instant) -> Option<Duration> {
         let heard = self.default.heard.get(&node)?;

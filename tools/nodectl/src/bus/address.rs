@@ -47,6 +47,17 @@ impl Address {
         matches!(self, Address::SlcanSerial(_) | Address::SlcanTcp(_))
     }
 
+    /// What a user can look at when the open bus is lost; `None` where the error tells it.
+    #[must_use]
+    pub fn lost_hint(&self) -> Option<String> {
+        let behind = match self {
+            Address::Socketcand { .. } => "the daemon or the simulator",
+            Address::SlcanTcp(_) => "the adapter",
+            Address::SocketCan(_) | Address::SlcanSerial(_) => return None,
+        };
+        Some(format!("the connection to {self} has ended: does {behind} still run?"))
+    }
+
     /// Opens the bus.
     ///
     /// `bit_rate` in kbit/s is for slcan adapters. The bit rate of the other buses is set elsewhere.

@@ -1,6 +1,6 @@
 //! `nodectl map --dbc`: the TPDOs of nodes as a DBC file, for tools that do not know CANopen.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -21,6 +21,8 @@ const LONGEST: usize = 32;
 struct Lines {
     messages: String,
     kinds: String,
+    /// The CAN-ID and the name of each message.
+    names: Vec<(u16, String)>,
 }
 
 /// Writes the configured TPDOs of these nodes. A node that does not answer or refuses is left out, and is an
@@ -30,6 +32,7 @@ pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Res
     for node in nodes {
         match read(session, *node) {
             Ok(lines) => {
+                all.names.extend(lines.names);
                 all.messages += &lines.messages;
                 all.kinds += &lines.kinds;
                 names.push(format!("Node{}", node.get()));
@@ -40,6 +43,9 @@ pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Res
             }
             Err(failure) => return Err(failure),
         }
+    }
+    if let Some(words) = shared(&all.names) {
+        return Err(Failure::file(file, words));
     }
     if !names.is_empty() {
         save(session, &names, &all, file)?;
@@ -53,8 +59,17 @@ pub(super) fn write(session: &mut Session, nodes: &[NodeId], file: &Path) -> Res
     }
 }
 
+/// Two messages with one CAN-ID, in words. A DBC file has one message for each, as the bus has one sender.
+fn shared(names: &[(u16, String)]) -> Option<String> {
+    let mut senders = BTreeMap::new();
+    names.iter().find_map(|(id, name)| {
+        let other = senders.insert(id, name)?;
+        Some(format!("nothing was written: {other} and {name} have one CAN-ID, {id:03X}h"))
+    })
+}
+
 fn save(session: &mut Session, names: &[String], lines: &Lines, file: &Path) -> Result<(), Failure> {
-    let Lines { messages, kinds } = lines;
+    let Lines { messages, kinds, .. } = lines;
     let text = format!("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {}\n{messages}\n{kinds}", names.join(" "));
     if file.as_os_str() == "-" {
         return Ok(session.output.write(text.as_bytes())?);
@@ -80,17 +95,14 @@ fn message(
     node: NodeId,
     catalogue: &Catalogue,
     tpdo: &Tpdo,
-    Lines { messages, kinds }: &mut Lines,
+    Lines { messages, kinds, names: message_names }: &mut Lines,
 ) -> Result<(), Failure> {
     let bits: usize = tpdo.mapping.iter().map(|mapped| usize::from(mapped.bits)).sum();
     let (id, node_id) = (tpdo.id, node.get());
+    let message = format!("Node{node_id}_TPDO{}", tpdo.number);
     // Writing to a string cannot fail.
-    let _ = writeln!(
-        messages,
-        "\nBO_ {id} Node{node_id}_TPDO{}: {} Node{node_id}",
-        tpdo.number,
-        bits.div_ceil(8)
-    );
+    let _ = writeln!(messages, "\nBO_ {id} {message}: {} Node{node_id}", bits.div_ceil(8));
+    message_names.push((id, message));
     let (mut start, mut names) = (0, BTreeSet::new());
     for mapped in &tpdo.mapping {
         let place = at(mapped.index, mapped.sub);

@@ -12,6 +12,7 @@ use serde::{Serialize, Serializer};
 
 use super::read::place;
 use super::replacement::Replacement;
+use super::session::loss;
 use super::store::{Group, Order, sign};
 use super::{Failure, Session};
 use crate::configuration::{Configuration, Difference, Write, is_unclear, node_of, plan};
@@ -60,7 +61,7 @@ pub(super) struct Apply {
     #[arg(long)]
     save: bool,
 
-    /// Write a file for another product, too.
+    /// Write also a file for another product, and one with missing parts or values that cannot be read.
     #[arg(long)]
     force: bool,
 }
@@ -108,7 +109,7 @@ impl Dump {
         let mut file = values.to_sheet(&sheet, node, self.all);
         let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
         file.commissioning =
-            Some(Commissioning { node_id: node.get(), bit_rate: session.options.bit_rate, serial });
+            Some(Commissioning { node_id: node.get(), bit_rate: session.options.known_bit_rate(), serial });
         let name = self.file.file_name().and_then(|name| name.to_str()).unwrap_or("-");
         let reals = if self.bits { Reals::Bits } else { Reals::Decimal };
         let text = file.to_dcf(name, reals);
@@ -173,11 +174,16 @@ impl Apply {
         session.print(&Done { node: node.get(), writes: written.len(), saved: self.save })
     }
 
+    /// Refuses a file with missing parts, and one for another product.
     fn check(&self, session: &mut Session, node: NodeId, sheet: &Eds) -> Result<(), Failure> {
-        match mismatch(session, node, sheet)? {
-            Some(words) if !self.force => Err(Failure::file(&self.file, format!("it is {words}"))),
-            _ => Ok(()),
+        if self.force {
+            return Ok(());
         }
+        let refusal = match loss(sheet) {
+            Some(words) => Some(words),
+            None => mismatch(session, node, sheet)?.map(|words| format!("it is {words}")),
+        };
+        refusal.map_or(Ok(()), |words| Err(Failure::file(&self.file, words)))
     }
 
     fn step(&self, sheet: &Eds, step: Write) -> Step {
@@ -237,11 +243,8 @@ pub(super) fn bring(
         written.append(&mut steps);
         now = read(session)?;
     }
-    let left: Vec<String> = plan(sheet, &now, wanted)
-        .iter()
-        .filter(|step| now.values.get(&key(step.at)) != Some(&step.value))
-        .map(|step| left(step, &now, &refusals))
-        .collect();
+    let differences = wanted.differences(&now);
+    let left: Vec<String> = differences.iter().filter_map(|difference| left(difference, &refusals)).collect();
     if left.is_empty() { Ok(written) } else { Err(Failure::NotApplied(left.join(", "))) }
 }
 
@@ -252,11 +255,13 @@ fn key(Multiplexer { index, sub }: Multiplexer) -> (u16, u8) {
     (index, sub)
 }
 
-/// A parameter that has another value than wanted, with the reason where the node has told one.
-fn left(step: &Write, now: &Configuration, refusals: &Refusals) -> String {
-    let is = now.values.get(&key(step.at)).map_or("not there".to_owned(), Value::to_string);
-    let why = refusals.get(&key(step.at)).map(|code| format!(" ({code})")).unwrap_or_default();
-    visible(&format!("{} is {is} instead of {}{why}", Place(step.at), step.value))
+/// A parameter that has another value than wanted, with the reason where the node has told one; `None` where no value is
+/// wanted.
+fn left(Difference { at, first, second }: &Difference, refusals: &Refusals) -> Option<String> {
+    let wanted = first.as_ref()?;
+    let is = second.as_ref().map_or("not there".to_owned(), Value::to_string);
+    let why = refusals.get(&key(*at)).map(|code| format!(" ({code})")).unwrap_or_default();
+    Some(visible(&format!("{} is {is} instead of {wanted}{why}", Place(*at))))
 }
 
 /// Writes parameters in their order. A refused one does not stop the others: it may be taken in the next pass.

@@ -19,9 +19,9 @@ pub struct Options {
     #[arg(long, global = true, env = "NODECTL_BUS", default_value = "socketcand://127.0.0.1:29536/vcan0")]
     pub bus: Address,
 
-    /// Bit rate in kbit/s, for slcan adapters only.
-    #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S", default_value_t = 250)]
-    pub bit_rate: u16,
+    /// Bit rate in kbit/s, for slcan adapters and for the files of `dump`. Without it, an slcan adapter gets 250.
+    #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S")]
+    pub bit_rate: Option<u16>,
 
     /// Node-ID, for read, update and info several (1,2,5-8), for nmt also "all".
     #[arg(long, short, global = true, env = "NODECTL_NODE", default_value = "1")]
@@ -53,7 +53,20 @@ pub struct Options {
     pub authorisation_key: Option<PathBuf>,
 }
 
+/// The bit rate of an slcan adapter without `--bit-rate`, in kbit/s.
+const BIT_RATE: u16 = 250;
+
 impl Options {
+    /// The bit rate for an adapter and for numbers that need one, in kbit/s.
+    pub(super) fn bit_rate(&self) -> u16 {
+        self.bit_rate.unwrap_or(BIT_RATE)
+    }
+
+    /// The bit rate of the bus in kbit/s: that of the user, or that of the adapter. `None` where it is set elsewhere.
+    pub(super) fn known_bit_rate(&self) -> Option<u16> {
+        self.bit_rate.or_else(|| self.bus.needs_bit_rate().then_some(BIT_RATE))
+    }
+
     /// The options of SDO transfers.
     pub(super) fn sdo(&self) -> sdo::Options {
         let limit = Duration::from_millis(u64::from(self.limit) * 1000);

@@ -9,6 +9,8 @@ use serde::Serialize;
 use super::output::hex;
 use super::session::silence;
 use super::{Failure, Session};
+use crate::lift::is_lift;
+use crate::network::Heard;
 use crate::object::at;
 use crate::scan::{Presence, scan};
 use crate::text::{note, visible};
@@ -53,9 +55,12 @@ impl Scan {
         let is_empty = nodes.is_empty();
         let answering: Vec<u8> =
             nodes.iter().filter(|row| row.device_type.is_some()).map(|row| row.node).collect();
+        let has_lift = nodes.iter().filter_map(|row| row.device_type).any(is_lift);
         session.print(&Found { nodes })?;
-        for (node, heard) in session.network.all_heard().filter(|(node, _)| !answering.contains(&node.get()))
-        {
+        let is_there = |(node, heard): &(NodeId, Heard)| {
+            !answering.contains(&node.get()) && (heard.is_sure || !has_lift)
+        };
+        for (node, heard) in session.network.all_heard().filter(is_there) {
             note(format_args!("node {}: {}", node.get(), silence(node, Some(heard))));
         }
         if is_empty {

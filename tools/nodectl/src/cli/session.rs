@@ -19,10 +19,10 @@ use crate::bus::NoBus;
 use crate::configuration::Configuration;
 use crate::network::Heard;
 use crate::object::at;
-use crate::sdo::{self, Channel, Client};
+use crate::sdo::{self, Cause, Channel, Client};
 use crate::text::{note, visible_lines};
 use crate::value;
-use crate::{Catalogue, Network, heartbeat};
+use crate::{Catalogue, Network, heartbeat, update};
 
 /// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
@@ -60,7 +60,7 @@ impl Session {
     pub fn open(options: &Options, output: Output) -> Result<Session, Failure> {
         // Read the data sheet first, so that a wrong one is reported before the bus is opened.
         let sheets = Some(Sheets::read(options.eds.as_deref())?);
-        let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
+        let (address, bit_rate) = (options.bus.clone(), options.bit_rate());
         let mut network = Network::open(move || address.open(bit_rate))?;
         // Another client's transfer may run already.
         network.pause(LISTEN)?;
@@ -235,14 +235,30 @@ impl Session {
     }
 
     /// The failure of a transfer, with the name of the object and a hint.
-    pub(super) fn named(&mut self, error: sdo::Error) -> Failure {
+    pub(super) fn named(&self, error: sdo::Error) -> Failure {
+        self.explained(error).into()
+    }
+
+    /// The error of a transfer, with the name of the object and a hint.
+    pub(super) fn explained(&self, error: sdo::Error) -> sdo::Error {
         let name = self.catalogues.get(&error.node).and_then(|catalogue| catalogue.name(error.at));
         let hint = self.hint(&error);
-        sdo::Error { name: error.name.clone().or(name), hint, ..error }.into()
+        sdo::Error { name: error.name.clone().or(name), hint, ..error }
+    }
+
+    /// The error of an update, with a hint where it is that of a transfer.
+    pub(super) fn explained_update(&self, error: update::Error) -> update::Error {
+        match error {
+            update::Error::Sdo(error) => self.explained(error).into(),
+            other => other,
+        }
     }
 
     /// A hint for the user on an error.
     fn hint(&self, error: &sdo::Error) -> Option<String> {
+        if matches!(error.cause, Cause::Bus(_)) {
+            return self.options.bus.lost_hint();
+        }
         if error.is_silence() {
             return Some(silence(error.node, self.network.heard(error.node)));
         }
@@ -335,6 +351,18 @@ pub(super) fn sheet(path: &Path) -> Result<Eds, Failure> {
     }
     warn(path, &sheet);
     Ok(sheet)
+}
+
+/// Why the values of a file cannot all be written: a part of it is missing, or a value cannot be read.
+pub(super) fn loss(sheet: &Eds) -> Option<String> {
+    let loss = sheet.warnings.iter().find(|warning| warning.is_loss())?;
+    Some(format!("nothing was written: {}", visible_lines(&loss.to_string())))
+}
+
+/// A configuration file whose values can all be written.
+pub(super) fn whole(path: &Path) -> Result<Eds, Failure> {
+    let sheet = sheet(path)?;
+    loss(&sheet).map_or(Ok(sheet), |words| Err(Failure::file(path, words)))
 }
 
 /// Prints the first mistakes of a data sheet.

@@ -235,7 +235,7 @@ fn print_by_id(session: &mut Session, counted: &ByCanId) -> Result<(), Failure> 
         session.output.write(format!("{HEAD}\n").as_bytes())?;
     }
     counted.rows().try_for_each(|row| session.print(&row))?;
-    let bus = counted.bus(session.options.bit_rate);
+    let bus = counted.bus(session.options.bit_rate());
     session.print(&bus)
 }
 

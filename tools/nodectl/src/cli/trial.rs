@@ -40,8 +40,10 @@ fn run(session: &mut Session, decision: Decision, result: &'static str) -> Resul
     let (sdo, key) = (session.options.sdo(), session.options.authorisation_key()?);
     for node in session.options.node.list()? {
         session.begin();
-        decide(&mut session.network, node, decision, sdo, key.as_ref())?;
-        let identification = Program::new(&mut session.network, node, sdo).identification()?;
+        let decided = decide(&mut session.network, node, decision, sdo, key.as_ref());
+        decided.map_err(|error| session.explained_update(error))?;
+        let identification = Program::new(&mut session.network, node, sdo).identification();
+        let identification = identification.map_err(|error| session.named(error))?;
         session.print(&Report { node: node.get(), result, identification })?;
     }
     Ok(())

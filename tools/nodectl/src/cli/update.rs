@@ -68,6 +68,9 @@ impl Update {
             confirm: !self.no_confirm,
         };
         let results = update(&mut session.network, &nodes, &image, &options, &mut Bar::new());
+        let explained = |error| session.explained_update(error);
+        let results: Vec<_> =
+            results.into_iter().map(|(node, result)| (node, result.map_err(explained))).collect();
         // With a single node, its error is the error of the command.
         for (node, result) in results.iter().filter(|(_, result)| result.is_ok() || nodes.len() > 1) {
             session.print(&Report::new(*node, result))?;

@@ -1,7 +1,7 @@
 //! The settings in a file for each node: its identity, and the values of its parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use canopen::{Duration, NodeId};
@@ -11,7 +11,7 @@ use thiserror::Error;
 use super::{File, Member, Start};
 use crate::Catalogue;
 use crate::configuration::{Configuration, is_parameter};
-use crate::object::Place;
+use crate::object::{Place, at};
 use crate::value::Value;
 
 /// The CAN-ID in a COB-ID.
@@ -61,13 +61,14 @@ pub enum PlanError {
 }
 
 impl Plan {
-    /// The plan of a file. `read` reads the data sheet or configuration file of a path in it.
+    /// The plan of a file. `sheet` reads the data sheet of a path in it, `configuration` the configuration file.
     ///
     /// # Errors
-    /// What `read` cannot read, and mistakes of the file.
+    /// What these cannot read, and mistakes of the file.
     pub fn new<E: From<PlanError>>(
         file: File,
-        mut read: impl FnMut(&Path) -> Result<Eds, E>,
+        mut sheet: impl FnMut(&Path) -> Result<Eds, E>,
+        mut configuration: impl FnMut(&Path) -> Result<Eds, E>,
     ) -> Result<Plan, E> {
         let mut nodes: Vec<PlannedNode> = Vec::new();
         for member in file.nodes {
@@ -75,8 +76,8 @@ impl Plan {
             if nodes.iter().any(|other| other.node == node) {
                 return Err(PlanError::Twice(member.node).into());
             }
-            let mut sheet = |path: &Option<PathBuf>| path.as_deref().map(&mut read).transpose();
-            let (eds, dcf) = (sheet(&member.sheet)?, sheet(&member.configuration)?);
+            let eds = member.sheet.as_deref().map(&mut sheet).transpose()?;
+            let dcf = member.configuration.as_deref().map(&mut configuration).transpose()?;
             let catalogue = eds.or_else(|| dcf.clone()).map(|sheet| Arc::new(Catalogue::new(sheet)));
             let planned = PlannedNode { node, member, catalogue, dcf };
             if let Some(catalogue) = &planned.catalogue {
@@ -136,14 +137,29 @@ impl PlannedNode {
             single.push(("100D".to_owned(), guarding.factor.to_string()));
         }
         single.extend(self.member.values.iter().map(|(name, value)| (name.clone(), value.to_string())));
-        for (name, value) in single {
-            let (key, value) = self.value(catalogue, &name, &value)?;
-            wanted.values.insert(key, value);
-        }
+        wanted.values.extend(self.single_values(catalogue, single)?);
         if self.member.date.is_some() {
             wanted.values.retain(|(index, _), _| *index != 0x1020);
         }
         Ok(wanted)
+    }
+
+    /// Values by their names. An object has one value, in whatever way the file names it.
+    fn single_values(
+        &self,
+        catalogue: &Catalogue,
+        single: Vec<(String, String)>,
+    ) -> Result<BTreeMap<(u16, u8), Value>, PlanError> {
+        let mut values = BTreeMap::new();
+        for (name, text) in single {
+            let (key, value) = self.value(catalogue, &name, &text)?;
+            if let Some(other) = values.insert(key, value.clone()).filter(|other| *other != value) {
+                let place = Place(at(key.0, key.1));
+                let reason = format!("{place} is to be {other} and {value}: the file sets it twice");
+                return Err(PlanError::Value { node: self.node.get(), reason });
+            }
+        }
+        Ok(values)
     }
 
     fn value(&self, catalogue: &Catalogue, name: &str, text: &str) -> Result<((u16, u8), Value), PlanError> {

@@ -39,6 +39,18 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
+        let begin = self.network.now();
+        match self.upload_once(at) {
+            // Another client has asked in the same moment, and the server has dropped this transfer for the other one.
+            Err(error) if error.is_disturbed() && self.network.has_other_request_since(self.node, begin) => {
+                self.network.pause(turn()).map_err(|bus| Error { cause: bus.into(), ..error })?;
+                self.upload_once(at)
+            }
+            result => result,
+        }
+    }
+
+    fn upload_once(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
         let mut upload = Upload::new(self.node, at, Memory::default(), self.options());
         self.run(at, &mut upload, |_| ())?;
         Ok(upload.into_sink().0)
@@ -131,6 +143,11 @@ impl<'n> Client<'n> {
         }
         Ok(result?)
     }
+}
+
+/// The pause before a second try. It differs between processes, so that two of them do not ask in one moment again.
+fn turn() -> Duration {
+    Duration::from_millis(u64::from(std::process::id() % 16) * 5)
 }
 
 /// Calls `tell` only when the number has changed.

@@ -127,6 +127,8 @@ impl Rows {
             // The simulated device has no program.
             (0x1F51, 1) => row = row.with(Rule::Application),
             (0x1005, 0) => row = row.with(Rule::SyncProducer),
+            // The pre-defined COB-ID, where the data sheet has none that can be read.
+            (0x1014, 0) if formula.is_none() => row.default = DefaultValue::NodeId(0x80),
             _ => (),
         }
         if let (Type::OctetString(_), Some(value)) = (kind, value) {

@@ -18,6 +18,7 @@ pub use knowledge::Knowledge;
 pub use log::{Foreign, ForeignKind, LogReader, NotARecord, Record};
 
 use crate::Catalogue;
+use crate::lift::{is_fixed, is_lift};
 use crate::quantity::with_unit;
 use crate::text::hex_digits;
 use crate::value::Value;
@@ -135,6 +136,11 @@ impl Decoder {
         self.pdos.forget(node);
     }
 
+    /// Whether a known node is a lift device.
+    fn has_lift(&self) -> bool {
+        self.nodes.values().any(|known| known.catalogue().device_type().is_some_and(is_lift))
+    }
+
     /// Whether a node is one of this project.
     fn is_own(&self, node: Option<NodeId>) -> bool {
         let known = node.and_then(|node| self.nodes.get(&node));
@@ -193,7 +199,11 @@ impl Decoder {
                 });
                 lines.collect()
             }
-            (0x181..=0x57F, Some(node)) => one(Kind::Pdo, Some(node), Some(pdo::unknown(frame))),
+            (0x181..=0x57F, Some(node)) => {
+                // A PDO of a lift does not tell its node.
+                let node = Some(node).filter(|_| !(is_fixed(id) && self.has_lift()));
+                one(Kind::Pdo, node, Some(pdo::unknown(frame)))
+            }
             _ => one(Kind::Other, None, Some(Said::text(hex(frame)))),
         }
     }

@@ -75,6 +75,9 @@ enum Progress {
     Cleared,
     /// The new program is downloaded and valid.
     Complete,
+    /// The loader has a complete program of an earlier download, which the user may have interrupted. Its identification
+    /// is known once it runs.
+    Found,
 }
 
 /// The update of one node.
@@ -172,6 +175,9 @@ impl<'a> Job<'a> {
     /// the reason in its status.
     fn is_another(&self, network: &mut Network, expected: u32, found: u32) -> Result<Error, Error> {
         let node = self.node;
+        if self.progress == Progress::Found {
+            return Ok(Error::OnTrial { node });
+        }
         Ok(match self.program(network).status()? {
             Some(status) if !is_good(status) => Error::Flash { node, status },
             _ => Error::Identification { node, expected, found },
@@ -213,14 +219,17 @@ impl<'a> Job<'a> {
             self.wait_until_running(network, false, "stop its program")?;
         }
         let cleared = self.clear(network, watcher);
-        // The download was complete when the node was lost, so the program on trial is the new one.
-        let is_complete = self.progress == Progress::Cleared && matches!(cleared, Err(Error::OnTrial { .. }));
-        if !is_complete {
-            cleared?;
-            self.progress = Progress::Cleared;
-            self.fill(network, watcher)?;
-        }
-        self.progress = Progress::Complete;
+        self.progress = match (cleared, self.progress) {
+            // The download was complete when the node was lost, so the program on trial is the new one.
+            (Err(Error::OnTrial { .. }), Progress::Cleared) => Progress::Complete,
+            (Err(Error::OnTrial { .. }), _) if !is_running && self.image.info.is_some() => Progress::Found,
+            (cleared, _) => {
+                cleared?;
+                self.progress = Progress::Cleared;
+                self.fill(network, watcher)?;
+                Progress::Complete
+            }
+        };
         Ok(())
     }
 
@@ -395,7 +404,7 @@ impl<'a> Job<'a> {
         let before = self.before.as_ref().and_then(|before| before.identification);
         let is_other = before != Some(info.identification);
         let is_new = is_other || now.is_running && self.program(network).is_on_trial()?;
-        Ok(self.progress == Progress::Cleared && is_new)
+        Ok(matches!(self.progress, Progress::Cleared | Progress::Found) && is_new)
     }
 
     fn text(&self, network: &mut Network, at: Multiplexer) -> Result<Option<String>, Error> {

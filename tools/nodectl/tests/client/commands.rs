@@ -6,7 +6,7 @@ use nodectl::cli::{Cli, Failure, Output, Paper, Session};
 
 use crate::loader::{Loader, identification};
 use crate::pressure::Pressure;
-use crate::wire::Wire;
+use crate::wire::{Fate, Wire};
 
 /// Runs a command. Returns its output and its result.
 pub(crate) fn run<S: nodectl::bus::Station + 'static>(
@@ -50,6 +50,28 @@ fn read_by_index_and_by_name() {
     printed(&wire, &["write", "6131:1", "0xFD4E0000"]);
     let line = printed(&wire, &["read", "--block", "Pressure span end"]);
     assert_eq!(line, "6149h:1 AI span end/Pressure span end = 10 mbar\n");
+}
+
+/// The node is not to blame when the connection of this program has ended.
+#[test]
+fn a_lost_bus_is_not_a_silent_node() {
+    let wire = Wire::new(Pressure::new(1));
+    wire.disturb(|frame| if frame.id() == 0x601 { Fate::BreaksTheBus } else { Fate::Arrives });
+    let (code, text) = failed(&wire, &["read", "1017"]);
+    assert_eq!(code, 4, "{text}");
+    assert!(text.contains("the connection to socketcand://127.0.0.1:29536/vcan0 has ended"), "{text}");
+    assert!(!text.contains("silent"), "{text}");
+}
+
+#[test]
+fn a_silent_node_is_told_for_each_command_of_its_program() {
+    let wire = Wire::new(vec![Loader::new(1, b"1.0.0\n")]);
+    for line in
+        [&["confirm", "-n", "9"][..], &["rollback", "-n", "9"], &["update", "--raw", "Cargo.toml", "-n", "9"]]
+    {
+        let (code, text) = failed(&wire, line);
+        assert_eq!((code, text.contains("node 9 is silent: is it on")), (3, true), "{text}");
+    }
 }
 
 #[test]
@@ -176,6 +198,15 @@ fn monitor_takes_pdos_and_reads_the_rest() {
         objects.contains(&"\"6130h:2\"".to_owned()) && objects.contains(&"\"1001h:0\"".to_owned()),
         "{lines}"
     );
+}
+
+#[test]
+fn monitor_tells_the_meaning_of_a_status() {
+    let wire = Wire::new(Pressure::new(1));
+    let line = printed(&wire, &["monitor", "--count", "1", "6150:1"]);
+    assert!(line.contains("6150h:1") && line.trim_end().ends_with(" [valid]"), "{line}");
+    let line = printed(&wire, &["--json", "monitor", "--count", "1", "6150:1"]);
+    assert!(line.contains("\"meaning\":\"valid\""), "{line}");
 }
 
 /// A new lift unit has no virtual device and sends nothing. This command gives it all virtual devices. No measurement

@@ -97,6 +97,62 @@ fn a_file_for_another_product_changes_nothing() {
     assert_eq!((code, text.contains("product 00000002h")), (7, true), "{text}");
 }
 
+/// A file that is cut, or that has a value which its object cannot have, is refused as a whole.
+#[test]
+fn a_damaged_file_is_not_applied() {
+    let wire = Wire::new(Pressure::new(1));
+    printed(&wire, &["write", "1017", "250"]);
+    let file = path("damaged.dcf");
+    printed(&wire, &["dump", "--all", &file]);
+    let whole = text(&file);
+    printed(&wire, &["write", "1017", "1000"]);
+    let cut = whole.split_once("[6124]").expect("6124h").0.to_owned();
+    let wrong = whole.replace("ParameterValue=250\r\n", "ParameterValue=-5\r\n");
+    let expected =
+        "[1017] ParameterValue: \"-5\" is not a value of UNSIGNED16, 0 to 65535; the value is left out";
+    for (damaged, words) in [(cut, "6124h is listed and has no section"), (wrong, expected)] {
+        std::fs::write(&file, &damaged).expect("a file");
+        for line in [&["apply", &file][..], &["apply", &file, "--dry-run"]] {
+            let (code, text) = failed(&wire, line);
+            assert_eq!((code, text.contains(words)), (7, true), "{text}");
+        }
+        assert!(printed(&wire, &["read", "1017"]).contains("= 1000 ms"), "nothing was written");
+    }
+    // By force, the rest is written.
+    printed(&wire, &["write", "1015", "300"]);
+    printed(&wire, &["apply", &file, "--force"]);
+    assert!(printed(&wire, &["read", "1015"]).contains("= 0 "));
+}
+
+/// Of a PDO that cannot be mapped, the steps are not told: only what is to be in the end.
+#[test]
+fn only_end_values_are_reported_as_different() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = path("mapping.dcf");
+    printed(&wire, &["dump", "--all", &file]);
+    let (before, after) = {
+        let all = text(&file);
+        let (before, after) = all.split_once("[1A00sub1]").expect("1A00h:1");
+        (before.to_owned(), after.to_owned())
+    };
+    let (value, rest) = after.split_once("ParameterValue=").expect("a value");
+    let rest = rest.split_once('\r').expect("a line").1;
+    std::fs::write(&file, format!("{before}[1A00sub1]{value}ParameterValue=0x10180120\r{rest}"))
+        .expect("a file");
+    let (code, text) = failed(&wire, &["apply", &file]);
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("1A00h:1 is ") && text.contains(" instead of 270008608 "), "{text}");
+    assert!(!text.contains("1800h:1") && !text.contains("1A00h:0"), "{text}");
+}
+
+#[test]
+fn a_file_has_the_bit_rate_where_it_is_known() {
+    let wire = Wire::new(Pressure::new(1));
+    assert!(!printed(&wire, &["dump"]).contains("Baudrate="));
+    assert!(printed(&wire, &["dump", "--bit-rate", "125"]).contains("\nBaudrate=125\r\n"));
+    assert!(printed(&wire, &["--bus", "slcan:/dev/ttyACM0", "dump"]).contains("\nBaudrate=250\r\n"));
+}
+
 #[test]
 fn a_mapping_is_made_in_one_command() {
     let wire = Wire::new(Pressure::new(1));

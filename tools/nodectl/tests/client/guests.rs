@@ -174,3 +174,33 @@ fn after_a_boot_and_after_silence_the_default_server_is_used() {
     client(&mut network, 1).upload(at(0x1017, 0)).expect_err("no such server");
     client(&mut network, 1).upload(at(0x1017, 0)).expect("the default server");
 }
+
+/// A node, and another client that asks in the moment in which this program has begun to read.
+struct Crossing {
+    node: Pressure,
+    has_asked: bool,
+}
+
+impl Station for Crossing {
+    fn receive(&mut self, received: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.node.receive(received, now, out);
+        if received.id() == 0x601 && received.data().starts_with(&[0x40, 0x08, 0x10]) && !self.has_asked {
+            self.has_asked = true;
+            let request = frame(0x601, [0x40, 0x17, 0x10, 0, 0, 0, 0, 0]);
+            let _: Result<(), QueueFull> = out.send(request);
+            self.node.receive(&request, now, out);
+        }
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        self.node.poll(now, out)
+    }
+}
+
+#[test]
+fn a_read_that_another_client_has_interrupted_is_tried_again() {
+    let wire = Wire::new(Crossing { node: Pressure::new(1), has_asked: false });
+    let line = printed(&wire, &["read", "1008", "--type", "vs"]);
+    assert!(line.contains("STM32F4 pressure transmitter"), "{line}");
+    assert!(wire.station(|crossing| crossing.has_asked));
+}

@@ -173,6 +173,51 @@ fn a_node_that_is_another_or_refuses_a_value_is_reported_and_nothing_is_started(
     });
 }
 
+/// The data sheet of node 3 is known only by its identity. Its mistake is found before another node is changed.
+#[test]
+fn a_mistake_at_the_last_node_changes_no_node() {
+    let wire = Wire::new(devices(3));
+    printed(&wire, &["nmt", "start", "-n", "all"]);
+    let path = file("by-identity.yaml", 3, |node| if node == 3 { ", 6FFF: 1" } else { "" }, |_| "");
+    let text = fs::read_to_string(&path).unwrap();
+    let (first, last) = text.split_at(text.rfind("    sheet:").unwrap());
+    fs::write(&path, first.to_owned() + last.split_once('\n').unwrap().1).unwrap();
+    let folder = corpus("");
+    let line = ["net", "apply", path.to_str().unwrap(), "--eds", folder.to_str().unwrap()];
+    let (code, text) = failed(&wire, &line);
+    assert_eq!(
+        (code, text.contains("node 3: 6FFFh:0 is no object that the data sheet lets write")),
+        (7, true),
+        "{text}"
+    );
+    wire.station(|nodes| {
+        assert!(nodes.iter().all(|node| node.state() == canopen::nmt::State::Operational));
+    });
+}
+
+#[test]
+fn an_object_is_set_once() {
+    let wire = Wire::new(devices(1));
+    let twice = file("twice.yaml", 1, |_| ", 1017: 500", |_| "");
+    let (code, text) = failed(&wire, &["net", "apply", twice.to_str().unwrap()]);
+    let words = "node 1: 1017h:0 is to be 200 and 500: the file sets it twice";
+    assert_eq!((code, text.contains(words)), (7, true), "{text}");
+    let same = file("same.yaml", 1, |_| ", 1017: 200", |_| "");
+    printed(&wire, &["net", "apply", same.to_str().unwrap()]);
+}
+
+#[test]
+fn a_truncated_configuration_file_changes_no_node() {
+    let wire = Wire::new(devices(2));
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let text = fs::read_to_string(corpus("dcf.dcf")).unwrap();
+    fs::write(folder.join("cut.dcf"), text.split_once("\n[1018]").unwrap().0).unwrap();
+    let file = folder.join("cut.yaml");
+    fs::write(&file, "nodes:\n  - node: 1\n  - node: 2\n    configuration: cut.dcf\n").unwrap();
+    let (code, text) = failed(&wire, &["net", "apply", file.to_str().unwrap()]);
+    assert_eq!((code, text.contains("1018h is listed and has no section")), (7, true), "{text}");
+}
+
 #[test]
 fn a_date_spares_the_comparison_and_is_written_last() {
     let mut text = fs::read_to_string(corpus("plain-encoder.eds")).unwrap();

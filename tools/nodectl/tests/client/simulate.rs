@@ -154,6 +154,19 @@ fn simulated_devices_pass_the_check_of_nodectl() {
 }
 
 #[test]
+fn a_dbc_file_has_one_message_for_each_can_id() {
+    let wire = Wire::new(vec![device("plain-io.eds", 1), device("plain-io.eds", 2)]);
+    let eds = corpus("plain-io.eds");
+    let eds = ["--eds", eds.to_str().unwrap()];
+    for cob_id in ["0x80000181", "0x181"] {
+        printed(&wire, &["write", "1800:1", cob_id, "-n", "2", eds[0], eds[1]]);
+    }
+    let (code, words) = failed(&wire, &["map", "--dbc", "-", "-n", "1,2", eds[0], eds[1]]);
+    let expected = "-: nothing was written: Node1_TPDO1 and Node2_TPDO1 have one CAN-ID, 181h";
+    assert_eq!((code, words.as_str()), (7, expected));
+}
+
+#[test]
 fn a_dbc_file_has_the_nodes_that_answer() {
     let wire = Wire::new(vec![device("plain-drive.eds", 1), device("plain-drive.eds", 2)]);
     let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("incomplete.dbc");

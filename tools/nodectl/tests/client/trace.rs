@@ -26,6 +26,18 @@ fn texts(frames: &[(u16, &[u8])]) -> Vec<String> {
     decoded(frames).into_iter().map(|line| line.text).collect()
 }
 
+/// CiA 417 fixes the CAN-ID of the car position. It is not that of TPDO 1 of node 12.
+#[test]
+fn a_pdo_of_a_lift_tells_no_node() {
+    let mut decoder = Decoder::default();
+    let position = Frame::new(0x18C, &[0; 4]).expect("a frame");
+    let node = |decoder: &mut Decoder| decoder.on_frame(&position, Instant(0))[0].node.map(NodeId::get);
+    assert_eq!(node(&mut decoder), Some(12));
+    let sheet = Catalogue::of_file("lift.eds").expect("a data sheet");
+    decoder.know(NodeId::new(33).expect("a node-ID"), Knowledge::new(sheet));
+    assert_eq!(node(&mut decoder), None);
+}
+
 #[test]
 fn services_in_words() {
     let cases: [(u16, &[u8], Kind, &str); 21] = [

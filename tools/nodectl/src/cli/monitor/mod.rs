@@ -10,7 +10,7 @@ mod view;
 use std::fmt;
 
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, Instant};
+use canopen::{Duration, Instant, NodeId};
 use clap::Args;
 use serde::Serialize;
 
@@ -22,6 +22,7 @@ use crate::acquisition::{Sample, Signal};
 use crate::object::Place;
 use crate::text::{note, visible};
 use crate::value::Value;
+use crate::{Catalogue, meaning};
 
 /// A hint is printed after this time without a value.
 const SILENCE: Duration = Duration::from_millis(2000);
@@ -61,6 +62,9 @@ struct Line<'a> {
     data_type: String,
     value: &'a Value,
     unit: &'a str,
+    /// The meaning of the number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    meaning: Option<String>,
     #[serde(skip)]
     short: &'a str,
 }
@@ -71,15 +75,17 @@ impl Monitor {
             return lift::print_lines(session, self.count.unwrap_or(usize::MAX));
         }
         if session.output.is_interactive() && !self.changes {
+            let catalogue = session.catalogue(session.options.node.one()?)?;
             let (mut acquisition, _) = self.source.open(session)?;
-            let view = View::new(acquisition.signals(), self.window.max(1).into());
+            let view = View::new(acquisition.signals(), catalogue, self.window.max(1).into());
             return screen::run(&mut acquisition, view, self.count);
         }
         self.print_lines(session)
     }
 
     fn print_lines(&self, session: &mut Session) -> Result<(), Failure> {
-        let node = session.options.node.one()?.get();
+        let node = session.options.node.one()?;
+        let catalogue = session.catalogue(node)?;
         let (mut acquisition, output) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
         let (mut start, mut left) = (None, self.count.unwrap_or(usize::MAX));
@@ -101,29 +107,37 @@ impl Monitor {
             if self.changes && before.as_ref() == Some(&sample.value) {
                 continue;
             }
-            output.print(&line(node, &signals[sample.signal], &sample, start))?;
+            output.print(&line(node, &catalogue, &signals[sample.signal], &sample, start))?;
             left -= 1;
         }
         Ok(())
     }
 }
 
-fn line<'a>(node: u8, signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> {
+fn line<'a>(
+    node: NodeId,
+    catalogue: &Catalogue,
+    signal: &'a Signal,
+    sample: &'a Sample,
+    start: Instant,
+) -> Line<'a> {
     Line {
         time: super::record::seconds_between(start, sample.at),
-        node,
+        node: node.get(),
         at: signal.at,
         name: signal.path.as_deref(),
         data_type: signal.data_type(&sample.value),
         value: &sample.value,
         unit: &signal.unit,
+        meaning: meaning::of(catalogue, signal.at, &sample.value),
         short: &signal.name,
     }
 }
 
 impl fmt::Display for Line<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Line { time, at, short, value, unit, .. } = self;
-        write!(f, "{time:10.6} {} {short} = {} {unit}", Place(*at), visible(&value.to_string()))
+        let Line { time, at, short, value, unit, meaning, .. } = self;
+        write!(f, "{time:10.6} {} {short} = {} {unit}", Place(*at), visible(&value.to_string()))?;
+        meaning.iter().try_for_each(|meaning| write!(f, " [{meaning}]"))
     }
 }

@@ -23,7 +23,7 @@ const fn column(title: &'static str, width: u16, cell: fn(&Track) -> String) -> 
 /// The columns in the order on the screen.
 const COLUMNS: [Column; 7] = [
     column("object", 9, |track| Place(track.signal.at).to_string()),
-    column("name", 0, |track| visible(&track.signal.name)),
+    column("name", 0, name),
     column("value", 12, |track| visible(&track.newest)),
     column("unit", 6, |track| track.signal.unit.clone()),
     column("least", 12, |track| bound(track.least.as_ref())),
@@ -82,6 +82,12 @@ fn cut(text: String, width: u16) -> String {
     let mut short: String = text.chars().take(width.saturating_sub(1)).collect();
     short.push('\u{2026}');
     short
+}
+
+/// The name, with the meaning of the newest value where it has one.
+fn name(track: &Track) -> String {
+    let meaning = track.meaning.as_ref().map(|meaning| format!(" [{meaning}]")).unwrap_or_default();
+    visible(&format!("{}{meaning}", track.signal.name))
 }
 
 fn bound(bound: Option<&(f64, String)>) -> String {

@@ -1,6 +1,7 @@
 //! The screen: the node, a table of all signals, and plots of as many signals as there is room for.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use canopen::Instant;
 use ratatui::Frame;
@@ -13,6 +14,7 @@ use super::status::Status;
 use super::{plot, table};
 use crate::acquisition::{Sample, Signal};
 use crate::cli::record::seconds_between;
+use crate::{Catalogue, meaning};
 
 /// The shortest and the longest time span of the plots in seconds. Points are kept for the longest span.
 const SHORTEST: f64 = 1.0;
@@ -32,6 +34,8 @@ const KEYS: [&str; 6] = [
 pub(super) struct Track {
     pub(super) signal: Signal,
     pub(super) newest: String,
+    /// The meaning of the newest value.
+    pub(super) meaning: Option<String>,
     pub(super) count: usize,
     pub(super) least: Option<(f64, String)>,
     pub(super) greatest: Option<(f64, String)>,
@@ -41,6 +45,7 @@ pub(super) struct Track {
 
 /// The state of the screen.
 pub(super) struct View {
+    catalogue: Arc<Catalogue>,
     tracks: Vec<Track>,
     chosen: usize,
     start: Option<Instant>,
@@ -53,17 +58,18 @@ pub(super) struct View {
 }
 
 impl View {
-    pub(super) fn new(signals: &[Signal], window: f64) -> View {
+    pub(super) fn new(signals: &[Signal], catalogue: Arc<Catalogue>, window: f64) -> View {
         let track = |signal: &Signal| Track {
             signal: signal.clone(),
             newest: "-".to_owned(),
+            meaning: None,
             count: 0,
             least: None,
             greatest: None,
             points: VecDeque::new(),
         };
         let tracks = signals.iter().map(track).collect();
-        View { tracks, chosen: 0, start: None, now: 0.0, window, is_held: false, has_help: false }
+        View { catalogue, tracks, chosen: 0, start: None, now: 0.0, window, is_held: false, has_help: false }
     }
 
     pub(super) fn take(&mut self, sample: &Sample) {
@@ -75,6 +81,7 @@ impl View {
         let oldest = self.now - LONGEST;
         if let Some(track) = self.tracks.get_mut(sample.signal) {
             track.take(sample, self.now, oldest);
+            track.meaning = meaning::of(&self.catalogue, track.signal.at, &sample.value);
         }
     }
 
@@ -161,10 +168,14 @@ mod tests {
     use crate::object::at;
     use crate::value::Value;
 
+    fn catalogue() -> Arc<Catalogue> {
+        Arc::new(Catalogue::of_file("pressure.eds").unwrap())
+    }
+
     fn view() -> View {
         let signals =
             [Signal::polled(at(0x6130, 1), "Pressure", "bar"), Signal::polled(at(0x1008, 0), "Name", "")];
-        View::new(&signals, 10.0)
+        View::new(&signals, catalogue(), 10.0)
     }
 
     fn take(view: &mut View, second: u64, value: f32) {
@@ -192,7 +203,7 @@ mod tests {
             Signal::polled(at(0x6130, 1), "Pressure process value", "bar"),
             Signal::polled(at(0x6130, 2), "Temperature process value", "\u{b0}C"),
         ];
-        let mut view = View::new(&signals, 30.0);
+        let mut view = View::new(&signals, catalogue(), 30.0);
         for step in 0..240_u32 {
             let (at, angle) = (Instant(u64::from(step) * 250_000), f64::from(step) / 8.0);
             #[allow(clippy::cast_possible_truncation)] // The value has only the digits of the sensor.
@@ -201,6 +212,15 @@ mod tests {
             view.take(&Sample { at, signal: 1, value: Value::Real32(25.125) });
         }
         view
+    }
+
+    #[test]
+    fn a_status_is_shown_with_its_meaning() {
+        let signals = [Signal::polled(at(0x6150, 1), "Pressure status", "")];
+        let mut view = View::new(&signals, catalogue(), 10.0);
+        view.take(&Sample { at: Instant(0), signal: 0, value: Value::Integer(3) });
+        let picture = screen(&view, 120, 10).join("\n");
+        assert!(picture.contains("Pressure status [not valid, positive"), "{picture}");
     }
 
     /// The expected pictures are in files beside the tests; SCREENS=write writes them.
@@ -300,7 +320,7 @@ mod tests {
                 screen(&view, width, height);
             }
         }
-        let mut empty = View::new(&[], 10.0);
+        let mut empty = View::new(&[], catalogue(), 10.0);
         empty.choose(1);
         screen(&empty, 80, 25);
     }

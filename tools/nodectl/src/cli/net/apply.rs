@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::super::dump::bring;
 use super::super::store::{Group, Order, sign};
-use super::check::{date, is_there, of_bus, of_identity, of_states, values};
+use super::check::{Found, date, is_there, of_bus, of_identity, of_states, values};
 use super::finding::{Finding, What, end, print};
 use super::{Applied, Failure, LISTEN, Session, catalogue, watch};
 use crate::net::{Date, Plan, PlannedNode, Start};
@@ -36,6 +36,7 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
         print(session, findings)
     };
     tell(session, &of_bus(plan, &found))?;
+    verify(session, plan, &found, how)?;
     let (mut configured, mut may_start) = (Vec::new(), true);
     for planned in &plan.nodes {
         if !is_there(&found, planned.node) {
@@ -61,6 +62,28 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
         return watch::run(session, plan, how);
     }
     end(count)
+}
+
+/// Looks for mistakes of the file at nodes whose data sheet depends on their identity, before any node is changed.
+fn verify(session: &mut Session, plan: &Plan, found: &Found, how: &Applied) -> Result<(), Failure> {
+    let is_open = |planned: &&PlannedNode| planned.catalogue.is_none() && is_there(found, planned.node);
+    for planned in plan.nodes.iter().filter(is_open) {
+        session.begin_all();
+        match verify_one(session, planned, how) {
+            // The configuration of the node reports it.
+            Err(failure @ Failure::Sdo(_)) => drop(Finding::of_failure(planned.node, failure)?),
+            result => result?,
+        }
+    }
+    Ok(())
+}
+
+fn verify_one(session: &mut Session, planned: &PlannedNode, how: &Applied) -> Result<(), Failure> {
+    if of_identity(session, planned)?.is_empty() {
+        let catalogue = catalogue(session, planned)?;
+        planned.wanted(&catalogue).map_err(|error| Failure::file(&how.file, error))?;
+    }
+    Ok(())
 }
 
 /// Starts the nodes with one command, if all nodes are to be started; otherwise one after the other.

@@ -72,7 +72,8 @@ fn add(session: &mut Session, node: NodeId, file: &Path, text: &mut String) -> R
     let values = session.configuration(node, sheet)?;
     let mut dcf = values.to_sheet(sheet, node, false);
     let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
-    dcf.commissioning = Some(Commissioning { node_id: id, bit_rate: session.options.bit_rate, serial });
+    dcf.commissioning =
+        Some(Commissioning { node_id: id, bit_rate: session.options.known_bit_rate(), serial });
     let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("net");
     let name = format!("{stem}-node{id}.dcf");
     Replacement::write(&file.with_file_name(&name), dcf.to_dcf(&name, Reals::Decimal).as_bytes())?;

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use canopen::Duration;
 use clap::{Args, Subcommand};
 
+use super::session::{sheet, whole};
 use super::{Failure, Session};
 use crate::Catalogue;
 use crate::net::{File, Plan, PlanError, PlannedNode, schema};
@@ -98,7 +99,7 @@ fn load(path: &Path) -> Result<Plan, Failure> {
     let text = wire::input::read_to_string(path, LARGEST).map_err(|error| Failure::file(path, error))?;
     let file = File::parse(&text).map_err(|reason| Failure::file(path, reason))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let plan = Plan::new(file, |named| super::session::sheet(&folder.join(named)));
+    let plan = Plan::new(file, |named| sheet(&folder.join(named)), |named| whole(&folder.join(named)));
     plan.map_err(|failure| match failure {
         Failure::Usage(reason) => Failure::file(path, reason),
         other => other,

@@ -79,7 +79,7 @@ impl Serve {
         // when it knows the address of the page, so the pump opens the bus then.
         let bus = match self.until_end_of_input {
             true => None,
-            false => Some(options.bus.open(options.bit_rate)?),
+            false => Some(options.bus.open(options.bit_rate())?),
         };
         let (orders, inbox) = mpsc::channel();
         let from_pages = orders.clone();

@@ -26,7 +26,7 @@ async function save(bus, all, result, steps) {
 async function compare(bus, file, { result, plan, steps, onApplied }) {
   const keys = { node: bus.chosen, text: await file.text() };
   plan.replaceChildren();
-  const said = ({ steps }) => (steps.length ? `${steps.length} objects would be written` : "the node is configured like this already");
+  const said = ({ steps, warnings }) => [steps.length ? `${steps.length} objects would be written` : "the node is configured like this already", ...warnings].join("; warning: ");
   const answer = await result.of(`comparing ${file.name}`, bus.request("apply", { ...keys, dry_run: true }, steps), said);
   if (!answer?.steps.length) return;
   const store = el("input", { type: "checkbox" });

@@ -8,6 +8,7 @@ use serde_json::{Value as Json, json};
 use super::{Context, Job};
 use crate::cli::dump::{bring, mismatch};
 use crate::cli::serve::request::Apply;
+use crate::cli::session::loss;
 use crate::cli::store::{Group, Order, sign};
 use crate::cli::{Failure, Session};
 use crate::configuration::{Configuration, plan};
@@ -57,7 +58,7 @@ pub(super) fn dcf(node: NodeId, all: bool) -> Job {
         let (sheet, values) = read(context, node)?;
         let mut file = values.to_sheet(&sheet, node, all);
         let serial = context.session.word(node, at(0x1018, 4))?.unwrap_or(0);
-        let bit_rate = context.session.options.bit_rate;
+        let bit_rate = context.session.options.known_bit_rate();
         file.commissioning = Some(Commissioning { node_id: node.get(), bit_rate, serial });
         let name = format!("node{}.dcf", node.get());
         let text = file.to_dcf(&name, Reals::Decimal);
@@ -70,6 +71,9 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
     let sheet = Eds::from_bytes(text.as_bytes()).map_err(|error| error.to_string())?;
     if sheet.objects.is_empty() {
         return Err("it is no data sheet: there is no object in it".to_owned());
+    }
+    if let Some(words) = loss(&sheet).filter(|_| !how.force) {
+        return Err(words);
     }
     Ok(Job::of_node(node, move |context| {
         let mismatch = mismatch(&mut context.session, node, &sheet)?;
@@ -95,6 +99,7 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
                 json!({ "index": index, "sub": sub, "path": path(&sheet, step.at), "value": step.value })
             })
             .collect();
-        Ok(json!({ "steps": rows, "writes": writes, "saved": saved }))
+        let warnings: Vec<String> = sheet.warnings.iter().map(ToString::to_string).collect();
+        Ok(json!({ "steps": rows, "writes": writes, "saved": saved, "warnings": warnings }))
     }))
 }

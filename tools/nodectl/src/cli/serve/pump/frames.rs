@@ -108,7 +108,7 @@ impl Pump {
         if self.bus.is_ok() || now < self.due.reopen {
             return;
         }
-        self.bus = self.setup.options.bus.open(self.setup.options.bit_rate);
+        self.bus = self.setup.options.bus.open(self.setup.options.bit_rate());
         self.due.reopen = clock::now() + REOPEN;
         if self.bus.is_ok() {
             self.time.restart();

@@ -141,7 +141,7 @@ impl Pump {
         inbox: Receiver<Order>,
     ) -> Pump {
         // The bit rate is known only of adapters that have to be told it. A simulator reports its bit rate later.
-        let bit_rate = setup.options.bus.needs_bit_rate().then_some(setup.options.bit_rate);
+        let bit_rate = setup.options.known_bit_rate();
         Pump {
             setup,
             bus: bus.ok_or_else(|| BusError::Lost(std::io::ErrorKind::NotConnected.into())),
