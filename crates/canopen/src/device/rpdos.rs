@@ -44,10 +44,9 @@ impl<D: Definition> Inner<D> {
         }
         if Self::has(Services::MULTIPLEXED_RPDO)
             && let Reception::Multiplexed(addressing) = reception
+            && self.on_mpdo(frame.bytes(), addressing, now)
         {
-            if self.on_mpdo(frame.bytes(), addressing, now) {
-                self.application.received(number, self.image.as_mut());
-            }
+            self.application.received(number, self.image.as_mut());
         }
         if reception != Reception::Complete || has_faults {
             self.on_reception(place, reception, now);
