@@ -249,5 +249,6 @@ def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str, nodes:
     server.stop()
     simulator.quit()
     activation, requests = activation_and_requests(simulator)
-    # The page waits twice the delay by the clock of the host. A simulator on a busy machine is behind that clock.
-    assert requests[0] > activation + delay / 2000, f"asked at {requests[0]}, the change began at {activation}"
+    # The page waits twice the delay by the clock of the host. A simulator on a busy machine is behind that clock, up to
+    # five times. A page that does not wait asks within 50 ms.
+    assert requests[0] > activation + 2 * delay / 5000, f"asked at {requests[0]}, the change began at {activation}"

@@ -136,13 +136,20 @@ fn keeping(all: u64) -> Range<u64> {
     copy - keeping + ENDS..copy - ENDS
 }
 
-/// Whether the power is cut in this operation.
+/// Whether the power is cut in this operation. The operations behind `keeping` are counted from its end, so that the sample
+/// does not depend on the size of A.
 fn is_cut(cut: u64, keeping: &Range<u64>) -> bool {
     if keeping.contains(&cut) {
         ((cut - keeping.start) / 2).is_multiple_of(either(KEEPING_SAMPLE, KEEPING_SAMPLE / 10))
     } else {
-        is_thorough() || (cut / 2).is_multiple_of(SAMPLE)
+        let number = cut.checked_sub(keeping.end).unwrap_or(cut);
+        is_thorough() || (number / 2).is_multiple_of(SAMPLE)
     }
+}
+
+/// Whether a second cut follows: in two of [`SECOND_CUTS`] cuts of the copy, among them two of the sample.
+fn has_second(cut: u64, all: u64, keeping: &Range<u64>) -> bool {
+    cut > all - COPY && (cut - keeping.end) / 2 % SECOND_CUTS >= SECOND_CUTS - 2
 }
 
 /// Cuts at every operation whose number has this remainder modulo two, so that two processes share the work; at a twentieth
@@ -157,7 +164,7 @@ fn cut_everywhere(rest: u64) {
     for cut in (1..=all).filter(|cut| cut % 2 == rest && is_cut(*cut, &keeping)) {
         victim.update(cut);
         let second = 1 + cut * 37 % COPY;
-        if cut > all - COPY && cut / 2 % SECOND_CUTS < 2 {
+        if has_second(cut, all, &keeping) {
             twice += usize::from(victim.cut_again(second));
         }
         let Some(found) = victim.recover() else { panic!("cut {cut} of {all}, perhaps then {second}") };

@@ -241,7 +241,7 @@ fn a_forced_update_with_the_same_code_is_repeated_after_a_loss() {
         let reports = update(&world, "16", &image, Some(outage));
         assert_eq!(reports[0]["result"], "updated", "{personality}");
         let bytes = image.to_bytes();
-        let mut bench = Bench::with(unshare(world), kbit * 1000, 16);
+        let bench = Bench::with(unshare(world), kbit * 1000, 16);
         assert!(bench.application().starts_with(&bytes), "{personality}: the new image is not there");
     }
 }
