@@ -93,7 +93,7 @@ impl<D: Definition> Device<D> {
         self
     }
 
-    /// As [`with_bit_rate`](Device::with_bit_rate), for a caller that has detected the bit rate and keeps it.
+    /// Sets the configured bit rate, as [`with_bit_rate`](Device::with_bit_rate) does, of a caller that has detected it.
     pub fn set_bit_rate(&mut self, bit_rate: BitRate) {
         self.services.set_bit_rate(bit_rate);
     }

@@ -413,13 +413,19 @@ fn a_request_right_after_a_block_upload_is_answered() {
     assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]));
 }
 
-#[test]
-fn a_block_leaves_room_in_the_queue() {
+/// A block upload of 700 bytes has begun, and the queue has this room.
+fn uploading(room: usize) -> Client {
     let mut client = Client::new();
     client.bench.device.application_mut().domain = data(700);
     client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 });
-    client.bench.out.room = 30;
+    client.bench.out.room = room;
     client.request(Request::BlockUploadStart);
+    client
+}
+
+#[test]
+fn a_block_leaves_room_in_the_queue() {
+    let mut client = uploading(30);
     client.bench.run(Duration::from_millis(50));
     assert_eq!(client.bench.out.room, 10);
     client.bench.out.room = 1000;
@@ -429,11 +435,7 @@ fn a_block_leaves_room_in_the_queue() {
 /// A client that gets no segment gives up.
 #[test]
 fn a_block_that_the_queue_never_takes_ends_with_the_time_out() {
-    let mut client = Client::new();
-    client.bench.device.application_mut().domain = data(700);
-    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 });
-    client.bench.out.room = 10;
-    client.request(Request::BlockUploadStart);
+    let mut client = uploading(10);
     client.bench.take();
     let mut responses = |ms| {
         client.bench.run(Duration::from_millis(ms));
@@ -531,11 +533,7 @@ proptest! {
 
 #[test]
 fn a_block_that_finds_the_queue_full_continues_after_one_millisecond() {
-    let mut client = Client::new();
-    client.bench.device.application_mut().domain = data(700);
-    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 });
-    client.bench.out.room = 30;
-    client.request(Request::BlockUploadStart);
+    let mut client = uploading(30);
     client.bench.out.room = 1000;
     let id = 0x580 + u16::from(crate::bench::ID);
     let segments =

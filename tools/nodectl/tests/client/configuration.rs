@@ -124,7 +124,7 @@ fn a_damaged_file_is_not_applied() {
     assert!(printed(&wire, &["read", "1015"]).contains("= 0 "));
 }
 
-/// Of a PDO that cannot be mapped, the steps are not told: only what is to be in the end.
+/// The error names the entry of a mapping that the node refuses, not the steps that lead to it.
 #[test]
 fn only_end_values_are_reported_as_different() {
     let wire = Wire::new(Pressure::new(1));
