@@ -57,7 +57,7 @@ class Thread:
         getattr(self, language)(text)
 
     def sh(self, text: str) -> None:
-        text = re.sub(r"cargo run (-q )?-p nodectl --", "nodectl", text)
+        text = text.replace("cargo nodectl", "nodectl")
         text = text.replace("target/thumbv7em-none-eabihf/release", str(Path(os.environ["NODE_IMAGES"]).resolve()))
         lines = text.splitlines()
         for line in [line for line in lines if line.startswith("cargo sim")]:
@@ -132,7 +132,7 @@ def test_commands_are_tagged():
 
 def commands(document: Path) -> list[str]:
     """The commands of `nodectl` in a document, in blocks and in the text, without comments and placeholders."""
-    text = document.read_text(encoding="utf-8").replace("cargo run -q -p nodectl --", "nodectl").replace("\\\n", " ")
+    text = document.read_text(encoding="utf-8").replace("cargo nodectl", "nodectl").replace("\\\n", " ")
     lines = re.findall(r"^(?:\$ )?(nodectl [^\n]*)", "\n".join(re.findall(r"^```.*?^```", text, re.M | re.S)), re.M)
     text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
     inline = [re.sub(r"\s+", " ", command) for command in re.findall(r"`(nodectl [^`]+)`", text)]

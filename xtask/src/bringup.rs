@@ -1,15 +1,14 @@
 //! `cargo xtask bringup`: the first hour of a board; with `--emulated`, of the emulated board.
 
 use std::ffi::OsString;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use anyhow::Result;
 
-use crate::command::{become_program, built, cargo};
-use crate::own_tool::package;
-use crate::setup::{self, emulator};
+use crate::command::become_program;
+use crate::setup;
 use crate::target::Toolchain;
-use crate::{images, progress};
+use crate::{images, own_tool};
 
 /// Builds the images and the tool, then becomes the tool.
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
@@ -25,10 +24,7 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     })?;
     let images = images::compile_node(&Toolchain::ensure()?, images::CHIP)?;
     let name = if is_emulated { "bringup-emulated" } else { "bringup" };
-    let mut tool = if is_emulated { emulator::cargo_with_emulator()? } else { cargo() };
-    tool.args(["build", "--profile", "sim", "-p", package(name), "--bin", name]);
-    progress::build("tools", &mut tool)?;
-    let mut program = Command::new(built(name));
+    let mut program = own_tool::build(name)?;
     if is_emulated {
         program.arg("--images").arg(images);
     } else {

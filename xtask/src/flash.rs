@@ -10,10 +10,10 @@ use programmer::probe::Board;
 
 use start::output;
 
-use crate::command::{become_program, built, cargo};
+use crate::command::{become_program, built};
 use crate::setup;
 use crate::target::Toolchain;
-use crate::{images, progress};
+use crate::{images, own_tool};
 
 /// The output of probe-rs when no probe is connected.
 const NO_PROBE: &str = "No debug probes were found";
@@ -79,9 +79,7 @@ impl Flags {
 
 pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     flags.check()?;
-    let mut tools = cargo();
-    tools.args(["build", "--profile", "sim", "-p", "programmer"]);
-    progress::build("tools", &mut tools)?;
+    own_tool::build("flash")?;
     let toolchain = Toolchain::ensure()?;
     if flags.development && flags.application.is_none() {
         // The images that `cargo xtask bringup` compares with the flash.
@@ -104,6 +102,7 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
 /// The public half of the key in this file, as hexadecimal digits.
 fn variable(key: &Path) -> Result<String> {
     let path = key.to_str().context("a path that is no text")?;
+    own_tool::build("sign")?;
     let line = output(built("sign"), &["public", "--rank", "release", path]).with_context(|| {
         format!("the key cannot be read: `cargo xtask sign public --rank release {path}` says more")
     })?;

@@ -1,4 +1,5 @@
-//! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
+//! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`, and
+//! `cargo nodectl` is `cargo xtask nodectl`.
 
 mod apt;
 mod bench;
@@ -63,6 +64,13 @@ enum Command {
         /// Flags of the simulator
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
+    },
+    /// Run `nodectl`, built with the simulator (all arguments go to nodectl; `cargo nodectl --help`)
+    #[command(disable_help_flag = true)]
+    Nodectl {
+        /// Arguments of nodectl
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
     },
     /// Skip instructions and flip flags and bits of registers while the bootloader decides what may start (docs/evidence.md)
     #[command(disable_help_flag = true)]
@@ -144,58 +152,55 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Some(Command::Sim { flags }) => sim::run(&flags),
-        Some(Command::Flash(flags)) => flash::run(&flags),
-        Some(Command::Bringup { flags }) => bringup::run(&flags),
-        Some(command) => run(command).map(|()| ExitCode::SUCCESS),
-        None => list().map(|()| ExitCode::SUCCESS),
-    };
+    let result = Cli::parse().command.map_or_else(list, run);
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
         ExitCode::from(2)
     })
 }
 
-fn run(command: Command) -> Result<()> {
+/// Runs the command. Some commands become another program, which has an exit status of its own.
+fn run(command: Command) -> Result<ExitCode> {
     match command {
-        Command::Images { development: true } => images::build(Tools::ByCargo),
-        Command::Images { development: false } => images::build_for_owner(),
-        Command::Sim { .. } | Command::Flash(_) | Command::Bringup { .. } => {
-            unreachable!("these have an exit status of their own")
-        }
-        Command::FaultInjection { flags } => fault_injection::try_all(&flags),
-        Command::Eds => eds::write(),
-        Command::Plots => plots::write(),
-        Command::Docs => site::build(),
-        Command::Pictures => pictures::take(),
-        Command::Sign { arguments } => own_tool::run("sign", &arguments),
-        Command::Protect { arguments } => own_tool::run("protect", &arguments),
-        Command::Fuzz(flags) => fuzz::run_fuzzer(&flags),
-        Command::Bench(options) => bench::measure(&options, Tools::ByCargo),
-        Command::Coverage => coverage::print(),
-        Command::Mutants(flags) => mutants::print(&flags),
-        Command::Regressions(flags) => regressions::run(&flags),
-        Command::Matrix => matrix::write(),
-        Command::Timing => timing::print(),
-        Command::Panics => callgraph::panics(Tools::ByCargo),
-        Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo),
-        Command::Reproducible => reproducible::check(&Toolchain::ensure()?),
-        Command::Release(flags) => release::make(&flags),
-        Command::Sbom(flags) => sbom::write(&flags),
-        Command::Setup { dry_run } => setup::run(dry_run),
-        Command::Test(flags) => test::run(&flags),
-        Command::ProbeLibclang => setup::probe(),
+        Command::Sim { flags } => return sim::run(&flags),
+        Command::Nodectl { arguments } => return own_tool::run("nodectl", &arguments),
+        Command::Sign { arguments } => return own_tool::run("sign", &arguments),
+        Command::Protect { arguments } => return own_tool::run("protect", &arguments),
+        Command::Flash(flags) => return flash::run(&flags),
+        Command::Bringup { flags } => return bringup::run(&flags),
+        Command::Images { development: true } => images::build(Tools::ByCargo)?,
+        Command::Images { development: false } => images::build_for_owner()?,
+        Command::FaultInjection { flags } => fault_injection::try_all(&flags)?,
+        Command::Eds => eds::write()?,
+        Command::Plots => plots::write()?,
+        Command::Docs => site::build()?,
+        Command::Pictures => pictures::take()?,
+        Command::Fuzz(flags) => fuzz::run_fuzzer(&flags)?,
+        Command::Bench(options) => bench::measure(&options, Tools::ByCargo)?,
+        Command::Coverage => coverage::print()?,
+        Command::Mutants(flags) => mutants::print(&flags)?,
+        Command::Regressions(flags) => regressions::run(&flags)?,
+        Command::Matrix => matrix::write()?,
+        Command::Timing => timing::print()?,
+        Command::Panics => callgraph::panics(Tools::ByCargo)?,
+        Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo)?,
+        Command::Reproducible => reproducible::check(&Toolchain::ensure()?)?,
+        Command::Release(flags) => release::make(&flags)?,
+        Command::Sbom(flags) => sbom::write(&flags)?,
+        Command::Setup { dry_run } => setup::run(dry_run)?,
+        Command::Test(flags) => test::run(&flags)?,
+        Command::ProbeLibclang => setup::probe()?,
     }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The commands, a line each.
-fn list() -> Result<()> {
+fn list() -> Result<ExitCode> {
     for command in Cli::command().get_subcommands().filter(|command| !command.is_hide_set()) {
         let about = command.get_about().map(ToString::to_string).unwrap_or_default();
         println!("cargo xtask {:<15} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
     }
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::command::{built, root, run, target_dir};
 use crate::images;
-use crate::own_tool::Tools;
+use crate::own_tool::{self, Tools};
 use crate::setup::{emulator, python};
 use crate::test::suite::{with_images, with_programs};
 
@@ -33,8 +33,7 @@ pub(crate) fn write() -> Result<()> {
     let mut tests = emulator::cargo_with_emulator()?;
     tests.args(["test", "--profile", "sim", "-p", "host-tests", "--features", "board", "--test", "matrix"]);
     run(with_images(tests.env(LOG, &log), true))?;
-    let mut programs = emulator::cargo_with_emulator()?;
-    run(programs.args(["build", "--profile", "sim", "-p", "sim", "-p", "nodectl", "-p", "programmer"]))?;
+    own_tool::build_simulator("tools")?;
     let mut clients = Command::new(python::clients()?);
     clients.args(["-m", "pytest", "-q", "host-tests/python/test_matrix.py"]).current_dir(root());
     clients.env("IO_MODULE_COMMAND", built("examples/io_module")).env(LOG, &log);

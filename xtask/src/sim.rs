@@ -8,23 +8,16 @@ use std::thread;
 use anyhow::{Result, anyhow};
 
 use crate::command::{become_program, built};
-use crate::setup::{self, emulator};
+use crate::setup;
 use crate::target::Toolchain;
-use crate::{images, progress};
-
-/// Builds the simulator, the tool that signs images, and the program that serves the page.
-fn build() -> Result<()> {
-    let mut command = emulator::cargo_with_emulator()?;
-    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "programmer", "-p", "nodectl"]);
-    progress::build("emulator 2/2", &mut command)
-}
+use crate::{images, own_tool};
 
 /// Builds the programs for the Cortex-M4 and for this machine at the same time, because each build leaves a core idle
 /// while it links.
 fn build_all(chip: &str) -> Result<PathBuf> {
     thread::scope(|scope| {
         let images = scope.spawn(|| images::compile_node(&Toolchain::ensure()?, chip));
-        build()?;
+        own_tool::build_simulator("emulator 2/2")?;
         images.join().map_err(|_| anyhow!("the build of the firmware was interrupted"))?
     })
 }

@@ -34,7 +34,7 @@ pub(crate) fn run(flags: &Flags) -> Result<()> {
     let needs = if flags.thorough { setup::THOROUGH } else { setup::TEST };
     setup::check(needs)?;
     let report = Report::new(flags.only.as_deref())?;
-    report.run([builds_for_host(), builds_for_target(needs, flags.thorough)], Vec::new())?;
+    report.build([builds_for_host(), builds_for_target(needs, flags.thorough)])?;
     let tests = suite::collect(flags.thorough, report.only())?;
     monitored::begin();
     let result = report.run([checks_for_host(), checks_for_target()], tests);

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -71,7 +71,7 @@ impl Pool {
     }
 
     /// Runs tests from a queue until it is empty. Now and then prints the number of finished tests.
-    fn work(&self, queue: &Mutex<VecDeque<Step>>, run: impl Fn(Step) -> bool) {
+    fn work(&self, queue: &Mutex<VecDeque<Step>>, run: impl Fn(Step)) {
         // The lock is released before the test runs.
         let next = || lock(queue).pop_front();
         while let Some(test) = next() {
@@ -99,8 +99,6 @@ pub(super) struct Report<'a> {
     begin: Instant,
     done: Mutex<Vec<Done>>,
     failed: Mutex<Vec<String>>,
-    /// Whether a step of a lane has failed.
-    is_over: AtomicBool,
 }
 
 impl<'a> Report<'a> {
@@ -108,15 +106,25 @@ impl<'a> Report<'a> {
     pub(super) fn new(only: Option<&'a str>) -> Result<Report<'a>> {
         fs::create_dir_all(logs())?;
         let (done, failed) = Default::default();
-        Ok(Report { only, begin: Instant::now(), done, failed, is_over: AtomicBool::new(false) })
+        Ok(Report { only, begin: Instant::now(), done, failed })
     }
 
     pub(super) fn only(&self) -> Option<&str> {
         self.only
     }
 
-    /// Runs the lanes, each in its order, and the tests in any order beside them: one test per core, and [`WAITING`]
-    /// tests per core that mostly wait.
+    /// Runs the builds of two lanes, each in its order. The tests depend on them: none begins after a failed one.
+    pub(super) fn build(&self, lanes: [Vec<Step>; 2]) -> Result<()> {
+        thread::scope(|scope| {
+            for lane in lanes {
+                scope.spawn(|| self.lane(lane, || lock(&self.failed).is_empty()));
+            }
+        });
+        self.ensure_none_failed()
+    }
+
+    /// Runs the checks of two lanes, each in its order, and the tests in any order beside them: one test per core, and
+    /// [`WAITING`] tests per core that mostly wait. A failed one stops no other one.
     pub(super) fn run(&self, lanes: [Vec<Step>; 2], tests: Vec<Step>) -> Result<()> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
         let pool = &Pool::new(tests);
@@ -124,7 +132,7 @@ impl<'a> Report<'a> {
             for lane in lanes {
                 scope.spawn(|| {
                     step_back(LANES);
-                    self.lane(lane);
+                    self.lane(lane, || true);
                 });
             }
             let queues = [(&pool.busy, workers, TESTS), (&pool.waiting, WAITING * workers, 0)];
@@ -140,22 +148,20 @@ impl<'a> Report<'a> {
         self.ensure_none_failed()
     }
 
-    /// Runs the steps of a lane. Steps depend on each other, so that none begins after a failed one.
-    fn lane(&self, steps: Vec<Step>) {
+    /// Runs the steps of a lane while it goes on.
+    fn lane(&self, steps: Vec<Step>, goes_on: impl Fn() -> bool) {
         for step in steps {
             let is_skipped = self.only.is_some_and(|only| !step.name.contains(only));
-            if is_skipped || self.is_over.load(Ordering::Relaxed) {
+            if is_skipped || !goes_on() {
                 continue;
             }
             eprintln!("== {}", step.name);
-            if !self.step(step, false) {
-                self.is_over.store(true, Ordering::Relaxed);
-            }
+            self.step(step, false);
         }
     }
 
     /// Runs one step. Its output is printed when it fails.
-    fn step(&self, step: Step, is_test: bool) -> bool {
+    fn step(&self, step: Step, is_test: bool) {
         let begin = Instant::now();
         let path = logs().join(step.name.replace(['/', ':', ' '], "_")).with_extension("log");
         let result =
@@ -169,7 +175,6 @@ impl<'a> Report<'a> {
             eprintln!("   {} done in {:.1} s", step.name, time.as_secs_f64());
         }
         lock(&self.done).push(Done { name: step.name, time, is_test });
-        result.is_ok()
     }
 
     fn ensure_none_failed(&self) -> Result<()> {
