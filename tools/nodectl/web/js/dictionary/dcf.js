@@ -2,7 +2,7 @@
 
 import { button, el, field } from "../dom.js";
 import { offer } from "../file.js";
-import { address } from "../format.js";
+import { address, hex } from "../format.js";
 import { outcome } from "../outcome.js";
 
 export function dcfTools(bus, onApplied) {
@@ -26,19 +26,24 @@ async function save(bus, all, result, steps) {
 async function compare(bus, file, { result, plan, steps, onApplied }) {
   const keys = { node: bus.chosen, text: await file.text() };
   plan.replaceChildren();
-  const said = ({ steps, warnings }) => [steps.length ? `${steps.length} objects would be written` : "the node is configured like this already", ...warnings].join("; warning: ");
+  const said = ({ changes, warnings }) => [changes.length ? `${objects(changes.length)} would change` : "the node is configured like this already", ...warnings].join("; warning: ");
   const answer = await result.of(`comparing ${file.name}`, bus.request("apply", { ...keys, dry_run: true }, steps), said);
-  if (!answer?.steps.length) return;
+  if (!answer?.changes.length) return;
   const store = el("input", { type: "checkbox" });
   const apply = async () => {
-    const done = await result.of("writing", bus.request("apply", { ...keys, save: store.checked }, steps), ({ writes, saved }) => `${writes} objects written${saved ? ", saved" : ""}`);
+    const done = await result.of("writing", bus.request("apply", { ...keys, save: store.checked }, steps), ({ changed, saved }) => `${objects(changed)} changed${saved ? ", saved" : ""}`);
     if (done) (plan.replaceChildren(), onApplied());
   };
-  plan.append(stepTable(answer.steps), el("div", { class: "bar" }, el("label", {}, store, " save in the node"), button("Write these", apply)));
+  plan.append(changeTable(answer.changes), el("div", { class: "bar" }, el("label", {}, store, " save in the node"), button("Write these", apply)));
 }
 
-function stepTable(steps) {
-  const rows = steps.map(({ index, sub, path, value }) => el("tr", {}, el("th", { scope: "row" }, address(index, sub)), el("td", {}, path), el("td", { class: "number" }, String(value))));
-  const head = el("tr", {}, ["Object", "Name", "Value"].map((name) => el("th", { scope: "col" }, name)));
-  return el("div", { class: "wide" }, el("table", {}, el("caption", {}, "What would be written"), el("thead", {}, head), el("tbody", {}, rows)));
+function objects(count) {
+  return count === 1 ? "1 object" : `${count} objects`;
+}
+
+function changeTable(changes) {
+  const number = (value) => el("td", { class: "number" }, value > 0xFFFF && Number.isInteger(value) ? `${value} (${hex(value)})` : String(value ?? "-"));
+  const rows = changes.map(({ index, sub, path, present, value }) => el("tr", {}, el("th", { scope: "row" }, address(index, sub)), el("td", {}, path), number(present), number(value)));
+  const head = el("tr", {}, ["Object", "Name", "Present", "New"].map((name) => el("th", { scope: "col" }, name)));
+  return el("div", { class: "wide" }, el("table", {}, el("caption", {}, "Changes"), el("thead", {}, head), el("tbody", {}, rows)));
 }
