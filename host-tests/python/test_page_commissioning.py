@@ -247,7 +247,7 @@ def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str, nodes:
         page.script(ask)
         page.request("lss.bit_rate", kbit=new, identity=None, store=True, activate=delay)
     else:
-        # A request of the page may not cross the command: the page cannot know of it yet.
+        # A request of the page may not cross the command, which the page does not know yet.
         assert nodectl(simulator, "lss", "--all", "set-rate", str(new), "--store").returncode == 0
         assert nodectl(simulator, "lss", "--all", "activate", str(delay)).returncode == 0
         page.script(ask)

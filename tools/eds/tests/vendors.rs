@@ -212,7 +212,7 @@ fn an_entry_whose_value_cannot_be_read_has_no_value() {
     }
 }
 
-/// A configuration file that is cut anywhere tells that a part of it is missing. The last key has no value that is written.
+/// A configuration file that is cut off anywhere has a warning of a missing part. The last key is not written to a node.
 #[test]
 fn a_truncated_file_has_a_gap() {
     let mut sheet = DEVICES[0].eds().clone();

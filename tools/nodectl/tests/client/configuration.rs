@@ -164,7 +164,7 @@ fn only_end_values_are_reported_as_different() {
 }
 
 #[test]
-fn a_file_has_the_bit_rate_where_it_is_known() {
+fn a_file_has_the_known_bit_rate() {
     let wire = Wire::new(Pressure::new(1));
     assert!(!printed(&wire, &["dump"]).contains("Baudrate="));
     assert!(printed(&wire, &["dump", "--bit-rate", "125"]).contains("\nBaudrate=125\r\n"));

@@ -86,7 +86,7 @@ fn forty_nodes_are_configured_saved_and_started_within_five_seconds() {
     assert!(took < 5.0, "{took} s");
     assert_eq!(lines.lines().filter(|line| line.ends_with("read back, saved")).count(), 40, "{lines}");
     assert_eq!(printed(&wire, &["net", "check", file]), "40 nodes are as the file says\n");
-    // It is saved, and a second run writes nothing.
+    // The nodes have saved the values, and a second run writes nothing.
     printed(&wire, &["nmt", "reset", "-n", "all"]);
     let lines = printed(&wire, &["net", "apply", file]);
     assert_eq!(lines.lines().filter(|line| line.ends_with("has it already")).count(), 40, "{lines}");
