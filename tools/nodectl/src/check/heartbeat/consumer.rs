@@ -26,8 +26,8 @@ pub(super) const CHECKS: &[Check] = &[
         "CiA 301, 7.5.2.19",
         before_the_first,
     ),
-    Check::new("ERR-28", "1016h with time 0 watches unused_node_id", "CiA 301, 7.5.2.19", time_zero),
-    Check::new("ERR-29", "1016h with node-ID 0 watches unused_node_id", "CiA 301, 7.5.2.19", node_zero),
+    Check::new("ERR-28", "1016h with time 0 watches nobody", "CiA 301, 7.5.2.19", time_zero),
+    Check::new("ERR-29", "1016h with node-ID 0 watches nobody", "CiA 301, 7.5.2.19", node_zero),
     Check::new("ERR-30", "1016h has entries of four bytes", "CiA 301, 7.5.2.19", entries),
 ];
 

@@ -11,7 +11,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("LSS-22", "The own node-ID is taken", "CiA 305, 3.10.1", own_node_id),
     Check::new("LSS-23", "Node-ID 254 is refused", "CiA 305, 3.10.1", node_id::<254, 1>),
     Check::new("LSS-24", "A bit rate that no table has is refused", "CiA 305, 3.10.2", bit_timing::<0, 200>),
-    Check::new("LSS-25", "A table that unused_node_id has is refused", "CiA 305, 3.10.2", bit_timing::<100, 0>),
+    Check::new("LSS-25", "A table that nobody has is refused", "CiA 305, 3.10.2", bit_timing::<100, 0>),
     Check::new("LSS-26", "The reserved bit rate is refused", "CiA 305, 3.10.2", bit_timing::<0, 5>),
     Check::new("LSS-27", "An unknown service is not answered", "CiA 305, 3.8", unknown),
     Check::new("LSS-28", "A request of seven bytes is not answered", "CiA 305, 3.8", short).recommended(),

@@ -7,10 +7,10 @@ use super::{identity, release, respond, select, selected, stays_silent};
 
 pub(super) const CHECKS: &[Check] = &[
     Check::new("LSS-01", "Selecting by identity is answered by 44h", "CiA 305, 3.9.2", answers),
-    Check::new("LSS-02", "Another vendor-ID selects unused_node_id", "CiA 305, 3.9.2", another::<0>),
-    Check::new("LSS-03", "Another product code selects unused_node_id", "CiA 305, 3.9.2", another::<1>),
-    Check::new("LSS-04", "Another revision number selects unused_node_id", "CiA 305, 3.9.2", another::<2>),
-    Check::new("LSS-05", "Another serial number selects unused_node_id", "CiA 305, 3.9.2", another::<3>),
+    Check::new("LSS-02", "Another vendor-ID selects nobody", "CiA 305, 3.9.2", another::<0>),
+    Check::new("LSS-03", "Another product code selects nobody", "CiA 305, 3.9.2", another::<1>),
+    Check::new("LSS-04", "Another revision number selects nobody", "CiA 305, 3.9.2", another::<2>),
+    Check::new("LSS-05", "Another serial number selects nobody", "CiA 305, 3.9.2", another::<3>),
     Check::new("LSS-06", "LSS tells the vendor-ID of 1018h", "CiA 305, 3.11.1", tells::<0>),
     Check::new("LSS-07", "LSS tells the product code of 1018h", "CiA 305, 3.11.1", tells::<1>),
     Check::new("LSS-08", "LSS tells the revision number of 1018h", "CiA 305, 3.11.1", tells::<2>),

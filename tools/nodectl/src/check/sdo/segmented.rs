@@ -18,13 +18,13 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("SDO-39", "A wrong toggle bit ends a download", "CiA 301, table 22", download_toggle),
     Check::new(
         "SDO-40",
-        "A segment that unused_node_id asked for is refused: upload",
+        "A segment that nobody asked for is refused: upload",
         "CiA 301, table 22",
         lone_upload_segment,
     ),
     Check::new(
         "SDO-41",
-        "A segment that unused_node_id asked for is refused: download",
+        "A segment that nobody asked for is refused: download",
         "CiA 301, table 22",
         lone_download_segment,
     ),
