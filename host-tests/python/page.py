@@ -12,7 +12,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
-from simulator import PATIENCE, Simulator
+from simulator import PATIENCE, Relay, Simulator
 
 #: The selector of the view on display.
 SHOWN = "main > section:not([hidden])"
@@ -33,8 +33,8 @@ class Server:
 
     started: list["Server"] = []
 
-    def __init__(self, simulator: Simulator, address: str = "127.0.0.1:0"):
-        bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+    def __init__(self, simulator: Simulator, address: str = "127.0.0.1:0", bus: Relay | None = None):
+        bus = f"socketcand://127.0.0.1:{(bus or simulator).socketcand}/vcan0"
         command = [os.environ["NODECTL_COMMAND"], "--json", "serve", bus, "--page", address, "--stimuli", simulator.greeting["control"]]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         Server.started.append(self)

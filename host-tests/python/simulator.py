@@ -13,6 +13,7 @@ import socket
 import subprocess
 import tempfile
 import threading
+import time
 import tty
 from pathlib import Path
 
@@ -140,6 +141,47 @@ class Simulator:
         for ends in [(lambda size: os.read(adapter, size), server.sendall), (server.recv, lambda data: os.write(adapter, data))]:
             threading.Thread(target=pass_on, args=ends, daemon=True).start()
         return os.ttyname(port)
+
+
+class Relay:
+    """A relay between clients and the socketcand port of a simulator. It notes the frames that pass, with the time of the host."""
+
+    def __init__(self, simulator: Simulator):
+        self.server = simulator.socketcand
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.socketcand = listener.getsockname()[1]
+        #: Time, direction ("send" of the client, "frame" of the bus), CAN-ID and data, in hexadecimal digits.
+        self.frames: list[tuple[float, str, int, str]] = []
+        #: Is asked before a frame of the client passes; a frame that it holds never does, and neither does a later one.
+        self.holds = lambda frames: False
+        self.has_held = threading.Event()
+        threading.Thread(target=self._accept, args=[listener], daemon=True).start()
+
+    def _accept(self, listener: socket.socket) -> None:
+        while True:
+            client, _ = listener.accept()
+            server = socket.create_connection(("127.0.0.1", self.server))
+            for ends in [(client, server), (server, client)]:
+                threading.Thread(target=self._pass_on, args=ends, daemon=True).start()
+
+    def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
+        text = ""
+        with contextlib.suppress(OSError):
+            while data := source.recv(4096):
+                *messages, text = (text + data.decode()).split(">")
+                for message in messages:
+                    if self._is_held(message.split()[1:]):
+                        return self.has_held.set()
+                    sink.sendall(f"{message}>".encode())
+            sink.shutdown(socket.SHUT_WR)
+
+    def _is_held(self, words: list[str]) -> bool:
+        match words:
+            # The bus has a time, the client a length.
+            case ["send" | "frame" as direction, can_id, _, *data]:
+                self.frames.append((time.monotonic(), direction, int(can_id, 16), "".join(f"{int(byte, 16):02X}" for byte in data)))
+                return direction == "send" and self.holds(self.frames)
+        return False
 
 
 def devices(flags: tuple) -> dict[int, str]:

@@ -3,6 +3,8 @@
 What is measured is told by time stamps of the bus, which are virtual time: no test looks at a clock of the host.
 """
 
+import re
+
 import pytest
 from page import CUT, Page, Server, size
 from selenium.webdriver.common.keys import Keys
@@ -279,12 +281,39 @@ def test_a_configuration_is_shown_before_it_is_written(page: Page, tmp_path):
     choose_node(page, "dictionary", PRESSURE)
     page.find("summary").click()
     page.field("Apply a file").send_keys(str(file))
-    page.says("#view-dictionary details.box table", "61A1h:1")
+    row = page.says("#view-dictionary details.box tbody", "61A1h:1")
+    assert row.split("\t")[0::2] == ["61A1h:1", "1"] and row.split("\t")[3] == "9", row
     assert page.read(PRESSURE, 0x61A1, 1) == 1, "nothing is written before the user has seen it"
     page.press("Write these")
-    page.says("#view-dictionary details.box", "objects written")
+    page.says("#view-dictionary details.box", "1 object changed")
     assert page.read(PRESSURE, 0x61A1, 1) == 9
     page.write(PRESSURE, 0x61A1, 1, 1)
+
+
+def test_warnings_of_a_file_are_lines_and_its_changes_are_those_of_one_node(page: Page, driver, tmp_path):
+    whole = page.request("dcf", node=PRESSURE, all=True)["text"]
+    changed = re.sub(r"(\[1A00sub1\][^\[]*?ParameterValue=)\w+", r"\g<1>0x71300110", whole)
+    changed = re.sub(r"(\[100[89]\][^\[]*?PDOMapping=)0", r"\g<1>FALSE", changed)
+    file = tmp_path / "node.dcf"
+    choose_node(page, "dictionary", PRESSURE)
+    page.find("summary").click()
+    box = "#view-dictionary details.box"
+    file.write_text(whole[: whole.rindex("PDOMapping=")])
+    page.field("Apply a file").send_keys(str(file))
+    page.says(box, "the file is cut off in its last section, before PDOMapping")
+    assert page.text(f"{box} table") == ""
+    file.write_text(changed)
+    # The same file again.
+    page.script("arguments[0].click()", page.field("Apply a file"))
+    page.field("Apply a file").send_keys(str(file))
+    row = page.says(f"{box} tbody", "1A00h:1")
+    assert "1630535968 (61300120h)\t1898971408 (71300110h)" in row and len(row.splitlines()) == 1, row
+    warnings = page.text(f"{box} ul").splitlines()
+    assert [warning.split(":")[0] for warning in warnings] == ["warning", "warning"], warnings
+    size(driver, 360, 800)
+    assert page.script(CUT) == []
+    choose_node(page, "dictionary", ENCODER)
+    page.until(lambda: page.text(f"{box} table") == "", "forget the changes of the other node")
 
 
 def test_a_mapping_is_changed_and_plotted(page: Page):

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import canopen
 import pytest
-from simulator import PATIENCE, Master, Simulator
+from simulator import PATIENCE, Master, Relay, Simulator
 
 STOP, START, CLEAR = 0, 1, 3
 AUTHORISATION = 0x2003
@@ -122,20 +122,18 @@ def test_an_update_that_is_interrupted_in_its_check_is_ended_by_the_next_run(sim
     """The node checks the program on its own. The next run finds it on trial in the bootloader, starts it, and confirms it."""
     b = image(tmp_path / "b.img", "0.2.0")
     c = Path(os.environ["NODE_IMAGES"]) / "firmware.img"
-    bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
-    line = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", "1", "update"]
+
+    def update(bus: Simulator | Relay, program: Path) -> list:
+        return [os.environ["NODECTL_COMMAND"], "--bus", f"socketcand://127.0.0.1:{bus.socketcand}/vcan0", "--node", "1", "update", program]
 
     def interrupt() -> None:
-        # On a busy machine the signal may come after the end. Then the node has to run the old program again.
-        for _ in range(5):
-            with subprocess.Popen([*line, b], stderr=subprocess.PIPE, text=True) as run:
-                for step in run.stderr:
-                    if "verify" in step:
-                        run.send_signal(signal.SIGINT)
-            if run.returncode == -signal.SIGINT:
-                return
-            assert nodectl(simulator, "update", c)["result"] == "updated"
-        raise AssertionError("no run was interrupted")
+        """Sends the signal when nodectl has asked for the state of the check, and before it has the answer."""
+        relay = Relay(simulator)
+        relay.holds = lambda frames: frames[-1][3].startswith("40571F01") and any(data[2:8] == "501F01" for _, _, _, data in frames)
+        with subprocess.Popen(update(relay, b)) as run:
+            assert relay.has_held.wait(10 * PATIENCE), "the program was not downloaded"
+            run.send_signal(signal.SIGINT)
+        assert run.returncode == -signal.SIGINT
 
     interrupt()
     report = nodectl(simulator, "update", b)
@@ -143,7 +141,7 @@ def test_an_update_that_is_interrupted_in_its_check_is_ended_by_the_next_run(sim
     # Another program is not taken for that of the file.
     assert nodectl(simulator, "update", c)["result"] == "updated"
     interrupt()
-    refused = subprocess.run([*line, c], capture_output=True, text=True, check=False)
+    refused = subprocess.run(update(simulator, c), capture_output=True, text=True, check=False)
     assert refused.returncode == 6, refused.stderr
     assert "its program is on trial" in refused.stderr
     assert nodectl(simulator, "confirm")["identification"] == identification(b)

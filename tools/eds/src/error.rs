@@ -60,6 +60,12 @@ pub enum Problem {
         /// The number in the file.
         found: usize,
     },
+    /// A last line that is cut off.
+    #[error("the file is cut off in its last line, \"{0}\"")]
+    BrokenLine(String),
+    /// A last section without the keys at the end of the others.
+    #[error("the file is cut off in its last section, before {0}")]
+    NoEnd(String),
     /// A missing list of objects, beside other lists.
     #[error("the list of objects is missing")]
     NoList,
@@ -71,7 +77,11 @@ impl Error {
     #[must_use]
     pub fn is_loss(&self) -> bool {
         match self.problem {
-            Problem::NoObject { .. } | Problem::Fewer { .. } | Problem::NoList => true,
+            Problem::NoObject { .. }
+            | Problem::Fewer { .. }
+            | Problem::NoList
+            | Problem::BrokenLine(_)
+            | Problem::NoEnd(_) => true,
             Problem::NoValue { .. } => self.key == "ParameterValue",
             _ => false,
         }

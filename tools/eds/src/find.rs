@@ -19,7 +19,7 @@ pub enum LookupError {
         /// Names that contain the name, else names that are like it.
         similar: Vec<String>,
     },
-    /// The text begins as an address and is none.
+    /// The text begins as an address, and the rest is wrong.
     #[error("\"{text}\" is no address: an address is four hexadecimal digits and a sub-index up to 255, such as {:04X}h:{}", .example.index, .example.sub)]
     NoAddress {
         /// The text.

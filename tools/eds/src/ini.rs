@@ -51,6 +51,20 @@ impl<'a> Ini<'a> {
         Some(Section { ini: self, name })
     }
 
+    /// The section at the end of the text.
+    pub(crate) fn last_section(&self) -> Option<Section<'_>> {
+        let mut headers = self.text.lines().rev().filter_map(|line| line.trim().strip_prefix('['));
+        self.section(headers.next()?.strip_suffix(']')?.trim().to_lowercase().as_str())
+    }
+
+    /// The last line where it has no line break and is not complete.
+    pub(crate) fn broken_line(&self) -> Option<&str> {
+        let line = self.text.rsplit('\n').next()?.trim();
+        let is_section = line.starts_with('[') && line.ends_with(']');
+        let is_complete = line.is_empty() || line.starts_with(';') || is_section || line.contains('=');
+        (!is_complete).then_some(line)
+    }
+
     /// The line of a key; without such a key, the line of the section. Of repeated keys the last one counts.
     fn line(&self, section: &str, key: &str) -> Option<usize> {
         let (mut inside, mut header, mut value) = (false, None, None);

@@ -72,7 +72,7 @@ impl Eds {
 }
 
 /// The index of `[1018]`; the index and sub-index of `[1018sub1]`.
-fn address(section: &str) -> Option<(u16, Option<u8>)> {
+pub(crate) fn address(section: &str) -> Option<(u16, Option<u8>)> {
     let hex = |text: &str| text.bytes().all(|byte| byte.is_ascii_hexdigit());
     let (index, sub) = section.split_once("sub").map_or((section, None), |(index, sub)| (index, Some(sub)));
     if index.len() != 4 || !hex(index) || !sub.is_none_or(hex) {

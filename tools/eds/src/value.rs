@@ -137,7 +137,7 @@ fn unsigned(value: i128, bits: u8) -> Option<i128> {
     }
 }
 
-/// What a text of a data type must be, with the range of an integer.
+/// The expected form of a text by its data type, with the range of an integer.
 pub(crate) fn expected(data_type: DataType) -> String {
     let range = match data_type.class() {
         Class::Signed(bits) => format!(", {} to {}", -(1_i128 << (bits - 1)), (1_i128 << (bits - 1)) - 1),

@@ -55,6 +55,24 @@ fn a_sheet_that_is_read_can_be_written_and_read_again() {
     }
 }
 
+/// A file that ends within its last object is not taken for a whole one, whatever the vendor.
+#[test]
+fn a_file_that_is_cut_in_its_last_object_has_a_gap() {
+    let mut cuts = 0;
+    for (name, bytes) in files().into_iter().filter(|(name, _)| name.starts_with("plain-")) {
+        let text = String::from_utf8(bytes).expect("a text");
+        let section = text.rfind("\n[").expect("a section");
+        let end = text.rfind("\nPDOMapping=").expect("a last key");
+        for end in (section + 1..end).step_by(5) {
+            let is_loss =
+                Eds::parse(&text[..end]).map_or(true, |cut| cut.warnings.iter().any(eds::Error::is_loss));
+            assert!(is_loss, "{name}: {}", &text[section..end]);
+            cuts += 1;
+        }
+    }
+    assert!(cuts > 100, "{cuts}");
+}
+
 /// A few bytes of each file are changed, and lines are removed: no text makes the reader panic.
 #[test]
 fn damaged_files_are_read_or_refused() {

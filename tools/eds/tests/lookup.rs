@@ -55,7 +55,7 @@ fn an_unknown_name_lists_similar_names() {
 }
 
 #[test]
-fn a_text_that_begins_as_an_address_shows_what_an_address_looks_like() {
+fn a_wrong_address_is_reported_with_an_example() {
     let eds = DEVICES[0].eds();
     for (text, example) in
         [("61300120h", "6130h:1"), ("0x61300120", "6130h:1"), ("1018.1", "1018h:1"), ("101", "1018h:1")]

@@ -116,7 +116,7 @@ impl Device {
         self.boot.may_restart();
     }
 
-    /// The bit rate changes: the node is silent until then, and nothing is expected of it until it is heard again.
+    /// The bit rate changes: the node is silent until then, and no rule applies before its next frame.
     pub(crate) fn retunes(&mut self, until: Instant) {
         self.boot.may_restart();
         self.heartbeat.pause();

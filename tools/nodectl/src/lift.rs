@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fixed_can_id_tells_no_node() {
+    fn a_fixed_can_id_has_no_node() {
         assert!(is_fixed(0x18C) && is_lift(0x0000_01A1));
         assert!(!is_fixed(0x510) && !is_fixed(0x701) && !is_lift(0x0002_0194));
     }

@@ -230,7 +230,8 @@ impl Network {
             let left = self.others.quiet(node, now).map_or(0, |quiet| PAUSE.0.saturating_sub(quiet.0));
             let is_busy = self.others.is_busy(node, now);
             // Without an answer, the frames may be the segments of a block whose begin was not heard.
-            let has_waited = now >= pause_until && self.others.has_answered_since(node, begin);
+            let has_waited =
+                now >= pause_until && self.others.heard(node).is_some_and(|heard| heard.answer >= begin);
             if !is_busy && (left == 0 || has_waited) {
                 return Ok(true);
             }
@@ -246,7 +247,7 @@ impl Network {
 
     /// Whether another client has sent a request on the SDO channel of a node since an instant.
     pub(crate) fn has_other_request_since(&self, node: NodeId, begin: Instant) -> bool {
-        self.others.has_asked_since(node, begin)
+        self.others.heard(node).is_some_and(|heard| heard.request >= begin)
     }
 
     /// Begins a log of all frames, sent and received. A former log is dropped.

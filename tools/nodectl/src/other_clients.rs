@@ -47,11 +47,13 @@ struct Servers {
     heard: BTreeMap<NodeId, Heard>,
 }
 
+/// The times of the newest frames between a server and another client.
 #[derive(Clone, Copy, Debug)]
-struct Heard {
-    request: Instant,
+pub(crate) struct Heard {
+    pub(crate) request: Instant,
     frame: Instant,
-    answer: Instant,
+    /// A client that sends the segments of a block without a pause has no answer from the server.
+    pub(crate) answer: Instant,
     block: Block,
 }
 
@@ -109,19 +111,12 @@ impl OtherClients {
 
     /// The time since the newest frame of another client's transfer on that channel; `None` where there was none.
     pub(crate) fn quiet(&self, node: NodeId, now: Instant) -> Option<Duration> {
-        let heard = self.servers(node).heard.get(&node)?;
-        Some(Duration(now.0.saturating_sub(heard.frame.0)))
+        Some(Duration(now.0.saturating_sub(self.heard(node)?.frame.0)))
     }
 
-    /// Whether the server of that channel has sent a frame to another client since an instant: a client that sends the
-    /// segments of a block without a pause lets no other in.
-    pub(crate) fn has_answered_since(&self, node: NodeId, begin: Instant) -> bool {
-        self.servers(node).heard.get(&node).is_some_and(|heard| heard.answer >= begin)
-    }
-
-    /// Whether another client has sent a request on that channel since an instant.
-    pub(crate) fn has_asked_since(&self, node: NodeId, begin: Instant) -> bool {
-        self.servers(node).heard.get(&node).is_some_and(|heard| heard.request >= begin)
+    /// The newest frames of the transfers of other clients on that channel; `None` where there was none.
+    pub(crate) fn heard(&self, node: NodeId) -> Option<Heard> {
+        self.servers(node).heard.get(&node).copied()
     }
 
     /// The time since the newest request of another client to a node; `None` where there was none.
@@ -232,12 +227,13 @@ mod tests {
     fn a_block_transfer_whose_begin_was_not_heard_is_busy_until_its_end() {
         let segment = [5, 1, 2, 3, 4, 5, 6, 7];
         let acknowledge = [0xA2, 127, 127, 0, 0, 0, 0, 0];
+        let answer = |others: &OtherClients| others.heard(node()).expect("a client").answer;
         let mut others = OtherClients::default();
         others.on_frame(&frame(0x605, segment), Instant(0));
         others.on_frame(&frame(0x585, acknowledge), Instant(10));
-        assert!(others.is_busy(node(), Instant(20)) && others.has_answered_since(node(), Instant(10)));
+        assert!(others.is_busy(node(), Instant(20)) && answer(&others) == Instant(10));
         others.on_frame(&frame(0x605, segment), Instant(30));
-        assert!(others.is_busy(node(), Instant(40)) && !others.has_answered_since(node(), Instant(40)));
+        assert!(others.is_busy(node(), Instant(40)) && answer(&others) == Instant(10));
         others.on_frame(&frame(0x585, [0xA1, 0, 0, 0, 0, 0, 0, 0]), Instant(50));
         assert!(!others.is_busy(node(), Instant(60)));
         others.on_frame(&frame(0x605, acknowledge), Instant(70));

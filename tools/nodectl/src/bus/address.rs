@@ -47,7 +47,7 @@ impl Address {
         matches!(self, Address::SlcanSerial(_) | Address::SlcanTcp(_))
     }
 
-    /// What a user can look at when the open bus is lost; `None` where the error tells it.
+    /// A hint for the user whose open bus is lost; `None` where the error has the reason.
     #[must_use]
     pub fn lost_hint(&self) -> Option<String> {
         let behind = match self {

@@ -210,7 +210,7 @@ impl Subject<'_> {
         let mut left = Vec::new();
         let Ok(sheet) = self.sheet() else { return Ok(left) };
         let now = self.configuration()?;
-        for write in plan(&sheet, &now, wanted) {
+        for write in plan(&now, wanted) {
             let Some(entry) = sheet.get(write.at.index, write.at.sub) else { continue };
             let bytes = write.value.encode(entry.data_type);
             match self.try_write(write.at.index, write.at.sub, &bytes) {

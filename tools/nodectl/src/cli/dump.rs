@@ -53,7 +53,7 @@ pub(super) struct Apply {
     /// The file: a DCF, or an EDS for the defaults.
     file: PathBuf,
 
-    /// Only say what would be written.
+    /// Show what would change, and write nothing.
     #[arg(long)]
     dry_run: bool,
 
@@ -81,17 +81,9 @@ struct Changed {
 }
 
 #[derive(Serialize)]
-struct Step {
-    #[serde(rename = "object", serialize_with = "place")]
-    at: Multiplexer,
-    name: Option<String>,
-    value: Value,
-}
-
-#[derive(Serialize)]
 struct Done {
     node: u8,
-    writes: usize,
+    changes: usize,
     saved: bool,
 }
 
@@ -143,14 +135,9 @@ impl Diff {
         };
         let first = Configuration::of_sheet(&sheet, node);
         let differences = first.differences(&second);
-        for Difference { at, first, second } in &differences {
-            let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry));
-            session.print(&Changed { at: *at, name, first: first.clone(), second: second.clone() })?;
-        }
-        match differences.len() {
-            0 => Ok(()),
-            count => Err(Failure::Different(count)),
-        }
+        let count = differences.len();
+        print(session, &sheet, differences)?;
+        if count == 0 { Ok(()) } else { Err(Failure::Different(count)) }
     }
 }
 
@@ -161,17 +148,16 @@ impl Apply {
         self.check(session, node, &sheet)?;
         note_node_id(&sheet, node, "written");
         note_unclear(&sheet);
+        let wanted = Configuration::of_sheet(&sheet, node);
         if self.dry_run {
             let now = session.configuration(node, &sheet)?;
-            let steps = plan(&sheet, &now, &Configuration::of_sheet(&sheet, node));
-            return steps.into_iter().try_for_each(|step| session.print(&self.step(&sheet, step)));
+            return print(session, &sheet, now.changes(&wanted));
         }
-        let wanted = Configuration::of_sheet(&sheet, node);
-        let written = bring(session, node, &sheet, &wanted, |session| session.configuration(node, &sheet))?;
+        let changes = bring(session, node, &sheet, &wanted, |session| session.configuration(node, &sheet))?;
         if self.save {
             sign(session, node, Order::Save, Group::All)?;
         }
-        session.print(&Done { node: node.get(), writes: written.len(), saved: self.save })
+        session.print(&Done { node: node.get(), changes, saved: self.save })
     }
 
     /// Refuses a file with missing parts, and one for another product.
@@ -185,11 +171,13 @@ impl Apply {
         };
         refusal.map_or(Ok(()), |words| Err(Failure::file(&self.file, words)))
     }
+}
 
-    fn step(&self, sheet: &Eds, step: Write) -> Step {
-        let name = sheet.get(step.at.index, step.at.sub).map(|entry| sheet.path(entry));
-        Step { at: step.at, name, value: step.value }
-    }
+fn print(session: &mut Session, sheet: &Eds, differences: Vec<Difference>) -> Result<(), Failure> {
+    differences.into_iter().try_for_each(|Difference { at, first, second }| {
+        let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry));
+        session.print(&Changed { at, name, first, second })
+    })
 }
 
 /// Warns the user of a file of another node-ID.
@@ -222,30 +210,29 @@ pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Resu
     Ok((device != product).then(words))
 }
 
-/// Writes the parameters that differ from the wanted ones, until `read` shows no difference. Returns the parameters that
-/// were written.
+/// Writes the parameters that differ from the wanted ones, until `read` shows no difference. Returns the number of
+/// parameters that differed.
 pub(super) fn bring(
     session: &mut Session,
     node: NodeId,
     sheet: &Eds,
     wanted: &Configuration,
     mut read: impl FnMut(&mut Session) -> Result<Configuration, Failure>,
-) -> Result<Vec<Write>, Failure> {
-    let mut written = Vec::new();
+) -> Result<usize, Failure> {
     let mut refusals = BTreeMap::new();
     let mut now = read(session)?;
+    let changes = now.changes(wanted).len();
     for _ in 0..PASSES {
-        let mut steps = plan(sheet, &now, wanted);
+        let steps = plan(&now, wanted);
         if steps.is_empty() {
-            return Ok(written);
+            return Ok(changes);
         }
         refusals = write_all(session, node, sheet, &steps)?;
-        written.append(&mut steps);
         now = read(session)?;
     }
     let differences = wanted.differences(&now);
     let left: Vec<String> = differences.iter().filter_map(|difference| left(difference, &refusals)).collect();
-    if left.is_empty() { Ok(written) } else { Err(Failure::NotApplied(left.join(", "))) }
+    if left.is_empty() { Ok(changes) } else { Err(Failure::NotApplied(left.join(", "))) }
 }
 
 /// The refusals of a node, by index and sub-index.
@@ -282,31 +269,24 @@ fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) 
 impl fmt::Display for Changed {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let text = |value: &Option<Value>| {
-            value.as_ref().map_or("-".to_owned(), |value| visible(&value.to_string()))
+            let hex = match value {
+                Some(Value::Integer(value)) if *value > 0xFFFF => format!(" ({value:08X}h)"),
+                _ => String::new(),
+            };
+            value.as_ref().map_or("-".to_owned(), |value| visible(&value.to_string()) + &hex)
         };
         let name = self.name.as_deref().unwrap_or_default();
         write!(f, "{} {name}: {} -> {}", Place(self.at), text(&self.first), text(&self.second))
     }
 }
 
-impl fmt::Display for Step {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let name = self.name.as_deref().unwrap_or_default();
-        write!(f, "{} {name} = {}", Place(self.at), visible(&self.value.to_string()))?;
-        match &self.value {
-            Value::Integer(value) if *value > 0xFFFF => write!(f, " ({value:08X}h)"),
-            _ => Ok(()),
-        }
-    }
-}
-
 impl fmt::Display for Done {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let saved = if self.saved { ", saved" } else { "" };
-        match self.writes {
+        match self.changes {
             0 => write!(f, "node {}: has it already{saved}", self.node),
-            writes => {
-                write!(f, "node {}: {}, read back{saved}", self.node, counted(writes, "write", "writes"))
+            changes => {
+                write!(f, "node {}: {}, read back{saved}", self.node, counted(changes, "change", "changes"))
             }
         }
     }

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn a_burst_is_counted_as_a_whole_wherever_it_begins() {
+    fn a_burst_is_counted_as_a_whole_at_any_begin() {
         for begin in [0.0, 0.05, 0.095, 0.1, 0.17] {
             assert_eq!(peak(&[0.0, begin + 0.101, begin + 0.14, begin + 0.2]).most(), 300, "{begin}");
         }
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn the_peak_begins_again_after_it_was_taken() {
+    fn a_taken_peak_begins_again() {
         let mut peak = peak(&[1.0, 1.01]);
         assert_eq!((peak.take(), peak.take()), (200, 0));
         peak.add(100, 1.02);

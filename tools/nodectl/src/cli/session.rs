@@ -48,6 +48,8 @@ pub struct Session {
     /// named none.
     pub(super) has_many_nodes: bool,
     catalogues: BTreeMap<NodeId, Arc<Catalogue>>,
+    /// The devices whose identity was read.
+    devices: BTreeMap<NodeId, Device>,
     /// The deadline of all transfers that belong together.
     deadline: Instant,
 }
@@ -87,6 +89,7 @@ impl Session {
             sheets: None,
             has_many_nodes: false,
             catalogues: BTreeMap::new(),
+            devices: BTreeMap::new(),
             deadline: Instant::NEVER,
         }
     }
@@ -187,9 +190,19 @@ impl Session {
         values.map_err(|error| self.named(error))
     }
 
-    /// Vendor-ID and product code of a node.
-    fn device(&mut self, node: NodeId) -> Result<Device, Failure> {
-        Ok((self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?))
+    /// Vendor-ID and product code of a node. They are read once.
+    pub(super) fn device(&mut self, node: NodeId) -> Result<Device, Failure> {
+        if let Some(device) = self.devices.get(&node) {
+            return Ok(*device);
+        }
+        let device = (self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?);
+        Ok(*self.devices.entry(node).or_insert(device))
+    }
+
+    /// Forgets the identity and the catalogue of a node: another device may have its node-ID.
+    pub(super) fn forget(&mut self, node: NodeId) {
+        self.devices.remove(&node);
+        self.catalogues.remove(&node);
     }
 
     /// The catalogue of a node with this identity. A file that the user has named for one node is used for it, and the

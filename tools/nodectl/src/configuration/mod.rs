@@ -120,6 +120,15 @@ impl Configuration {
         keys.into_iter().filter_map(difference).collect()
     }
 
+    /// The parameters to which a wanted configuration gives another value. The steps that lead to them, such as those of a
+    /// PDO, are not among them: [`plan`] has these.
+    #[must_use]
+    pub fn changes(&self, wanted: &Configuration) -> Vec<Difference> {
+        let mut differences = self.differences(wanted);
+        differences.retain(|difference| difference.second.is_some());
+        differences
+    }
+
     /// The data sheet with values: the values that differ from the defaults, or all values.
     #[must_use]
     pub fn to_sheet(&self, sheet: &Eds, node: NodeId, all: bool) -> Eds {

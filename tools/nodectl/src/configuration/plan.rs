@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 
 use canopen::sdo::Multiplexer;
-use eds::Eds;
 
-use super::{Configuration, same};
+use super::Configuration;
 use crate::object::at;
 use crate::value::Value;
 
@@ -27,11 +26,9 @@ const SLOTS: i128 = 64;
 /// the PDOs with differences, each in five steps (CiA 301, 7.5.2.36): off, mapping empty, mapping, number of entries,
 /// on.
 #[must_use]
-pub fn plan(sheet: &Eds, from: &Configuration, to: &Configuration) -> Vec<Write> {
-    let differs =
-        |key: &(u16, u8)| to.values.contains_key(key) && !same(from.values.get(key), to.values.get(key));
+pub fn plan(from: &Configuration, to: &Configuration) -> Vec<Write> {
     let changed: Vec<(u16, u8)> =
-        sheet.entries().map(|entry| (entry.index, entry.sub)).filter(differs).collect();
+        from.changes(to).iter().map(|change| (change.at.index, change.at.sub)).collect();
     let is_pdo = |index: u16| (0x1400..=0x1BFF).contains(&index);
     let others = changed.iter().filter(|key| !is_pdo(key.0)).filter_map(|key| write(to, *key));
     // The mapping of 1400h is at 1600h, and the mapping of 1800h is at 1A00h.
@@ -84,13 +81,10 @@ mod tests {
     use super::*;
     use crate::Catalogue;
 
-    fn sheet() -> Eds {
-        Catalogue::of_file("pressure.eds").expect("a data sheet").sheet().clone()
-    }
-
     fn configuration(changes: &[(u16, u8, i128)]) -> Configuration {
         let node = canopen::NodeId::new(5).expect("a node-ID");
-        let mut configuration = Configuration::of_sheet(&sheet(), node);
+        let catalogue = Catalogue::of_file("pressure.eds").expect("a data sheet");
+        let mut configuration = Configuration::of_sheet(catalogue.sheet(), node);
         for &(index, sub, value) in changes {
             configuration.values.insert((index, sub), Value::Integer(value));
         }
@@ -98,7 +92,7 @@ mod tests {
     }
 
     fn steps(changes: &[(u16, u8, i128)]) -> Vec<(u16, u8, i128)> {
-        let plan = plan(&sheet(), &configuration(&[]), &configuration(changes));
+        let plan = plan(&configuration(&[]), &configuration(changes));
         let step = |write: &Write| match write.value {
             Value::Integer(value) => (write.at.index, write.at.sub, value),
             _ => panic!("{write:?}"),

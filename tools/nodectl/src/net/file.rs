@@ -47,7 +47,7 @@ pub struct Member {
     pub sheet: Option<PathBuf>,
     /// The configuration file (DCF), relative to this file. Its values are written.
     pub configuration: Option<PathBuf>,
-    /// What the node must be.
+    /// The required identity.
     #[serde(default)]
     pub identity: Identity,
     /// The hardware version (1009h).
@@ -78,7 +78,7 @@ pub struct Member {
     pub save: bool,
 }
 
-/// What a node must be (CiA 302-2, 1F84h to 1F88h). What is left out may be anything.
+/// The required identity of a node (CiA 302-2, 1F84h to 1F88h). A key that is left out is not compared.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {

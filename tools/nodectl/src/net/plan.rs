@@ -64,7 +64,7 @@ impl Plan {
     /// The plan of a file. `sheet` reads the data sheet of a path in it, `configuration` the configuration file.
     ///
     /// # Errors
-    /// What these cannot read, and mistakes of the file.
+    /// A data sheet or a configuration file cannot be read, or the file has a mistake.
     pub fn new<E: From<PlanError>>(
         file: File,
         mut sheet: impl FnMut(&Path) -> Result<Eds, E>,

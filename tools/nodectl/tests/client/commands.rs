@@ -64,7 +64,7 @@ fn a_lost_bus_is_not_a_silent_node() {
 }
 
 #[test]
-fn a_silent_node_is_told_for_each_command_of_its_program() {
+fn a_silent_node_is_reported_by_each_command_of_its_program() {
     let wire = Wire::new(vec![Loader::new(1, b"1.0.0\n")]);
     for line in
         [&["confirm", "-n", "9"][..], &["rollback", "-n", "9"], &["update", "--raw", "Cargo.toml", "-n", "9"]]
@@ -201,7 +201,7 @@ fn monitor_takes_pdos_and_reads_the_rest() {
 }
 
 #[test]
-fn monitor_tells_the_meaning_of_a_status() {
+fn monitor_prints_the_meaning_of_a_status() {
     let wire = Wire::new(Pressure::new(1));
     let line = printed(&wire, &["monitor", "--count", "1", "6150:1"]);
     assert!(line.contains("6150h:1") && line.trim_end().ends_with(" [valid]"), "{line}");

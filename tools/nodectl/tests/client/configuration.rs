@@ -58,12 +58,14 @@ fn dump_apply_dump_is_the_same_for_every_personality() {
         printed(&wire, &["dump", &first, "-n", "5"]);
         assert_ne!(text(&first).replace("-1.dcf", ""), factory.replace("-2.dcf", ""));
         let fresh = Wire::new(Pressure::of(personality, 5));
-        assert_eq!(failed(&fresh, &["diff", &first, "-n", "5"]).0, 8, "{personality:?}");
-        let plan = printed(&fresh, &["apply", &first, "-n", "5", "--dry-run"]);
-        assert!(plan.lines().count() > 5, "{plan}");
+        let (differences, result) = run(&fresh, &["diff", &first, "-n", "5"]);
+        assert_eq!(result.unwrap_err().exit_code(), 8, "{personality:?}");
+        let changes = printed(&fresh, &["apply", &first, "-n", "5", "--dry-run"]);
+        assert!(changes.lines().count() >= 5, "{changes}");
+        assert_eq!(changes.lines().count(), differences.lines().count(), "{changes}{differences}");
         assert_eq!(failed(&fresh, &["diff", &first, "-n", "5"]).0, 8, "a dry run changes nothing");
         let done = printed(&fresh, &["apply", &first, "-n", "5", "--save"]);
-        assert!(done.contains("writes, read back, saved"), "{done}");
+        assert!(done.contains("changes, read back, saved"), "{done}");
         assert_eq!(printed(&fresh, &["diff", &first, "-n", "5"]), "");
         printed(&fresh, &["dump", &second, "-n", "5"]);
         assert_eq!(
@@ -124,6 +126,22 @@ fn a_damaged_file_is_not_applied() {
     assert!(printed(&wire, &["read", "1015"]).contains("= 0 "));
 }
 
+/// A PDO is changed in five steps, and the user has changed three objects.
+#[test]
+fn a_dry_run_shows_each_changed_object_once() {
+    let (wire, fresh) = (Wire::new(Pressure::new(1)), Wire::new(Pressure::new(1)));
+    let file = path("dry.dcf");
+    printed(&wire, &["map", "tpdo", "1", "7130:1", "--transmission", "1"]);
+    printed(&wire, &["dump", &file]);
+    assert_eq!(
+        printed(&fresh, &["apply", &file, "--dry-run"]),
+        "1800h:2 TPDO 1 communication parameter/Transmission type: 255 -> 1\n\
+         1A00h:0 TPDO 1 mapping parameter/Number of entries: 2 -> 1\n\
+         1A00h:1 TPDO 1 mapping parameter/Mapped object 1: 1630535968 (61300120h) -> 1898971408 (71300110h)\n"
+    );
+    assert_eq!(printed(&fresh, &["apply", &file]), "node 1: 3 changes, read back\n");
+}
+
 /// The error names the entry of a mapping that the node refuses, not the steps that lead to it.
 #[test]
 fn only_end_values_are_reported_as_different() {
@@ -146,7 +164,7 @@ fn only_end_values_are_reported_as_different() {
 }
 
 #[test]
-fn a_file_has_the_bit_rate_where_it_is_known() {
+fn a_file_has_the_known_bit_rate() {
     let wire = Wire::new(Pressure::new(1));
     assert!(!printed(&wire, &["dump"]).contains("Baudrate="));
     assert!(printed(&wire, &["dump", "--bit-rate", "125"]).contains("\nBaudrate=125\r\n"));

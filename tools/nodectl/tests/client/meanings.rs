@@ -132,7 +132,7 @@ fn an_inhibit_time_is_shown_in_milliseconds_too() {
 }
 
 #[test]
-fn an_acquisition_names_the_tpdos_that_it_waits_for_until_a_value_arrives() {
+fn an_acquisition_names_its_missing_tpdos_until_a_value_arrives() {
     let wire = Wire::new(Pressure::new(1));
     let mut network = wire.network();
     let catalogue = Catalogue::of_file("pressure.eds").expect("a data sheet");

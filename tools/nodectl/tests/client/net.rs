@@ -1,9 +1,11 @@
 //! A bus of many simulated devices by its file: each way to be wrong is found, and all are configured in time.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 use nodectl::object::at;
 use nodectl::simulate::Node;
@@ -11,7 +13,7 @@ use nodectl::simulate::Node;
 use crate::commands::{failed, printed, run};
 use crate::pressure::Pressure;
 use crate::simulate::{corpus, device};
-use crate::wire::Wire;
+use crate::wire::{Fate, Wire};
 
 const KINDS: [&str; 4] = ["plain-io.eds", "plain-drive.eds", "plain-encoder.eds", "plain-pressure.eds"];
 /// Parameters of the kinds that the file sets.
@@ -84,7 +86,7 @@ fn forty_nodes_are_configured_saved_and_started_within_five_seconds() {
     assert!(took < 5.0, "{took} s");
     assert_eq!(lines.lines().filter(|line| line.ends_with("read back, saved")).count(), 40, "{lines}");
     assert_eq!(printed(&wire, &["net", "check", file]), "40 nodes are as the file says\n");
-    // It is saved, and a second run writes nothing.
+    // The nodes have saved the values, and a second run writes nothing.
     printed(&wire, &["nmt", "reset", "-n", "all"]);
     let lines = printed(&wire, &["net", "apply", file]);
     assert_eq!(lines.lines().filter(|line| line.ends_with("has it already")).count(), 40, "{lines}");
@@ -166,7 +168,7 @@ fn a_node_that_is_another_or_refuses_a_value_is_reported_and_nothing_is_started(
     let (lines, result) = run(&wire, &["net", "apply", refused.to_str().unwrap()]);
     assert_eq!(result.unwrap_err().exit_code(), 11);
     assert!(lines.contains("node 1: sheet: "), "{lines}");
-    assert!(lines.contains("node 2: 2 writes, read back, saved\n"), "{lines}");
+    assert!(lines.contains("node 2: 2 changes, read back, saved\n"), "{lines}");
     assert!(lines.contains("node 3: refused: "), "{lines}");
     wire.station(|nodes| {
         assert!(nodes.iter().all(|node| node.state() == canopen::nmt::State::PreOperational));
@@ -242,13 +244,32 @@ fn a_date_spares_the_comparison_and_is_written_last() {
     let node = canopen::NodeId::new(5);
     let wire = Wire::new(Node::new(nodectl::simulate::Table::new(&eds, node).unwrap(), node));
     let file = file.to_str().unwrap();
-    assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: 3 writes, read back, saved\n");
+    assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: 3 changes, read back, saved\n");
     assert_eq!(printed(&wire, &["net", "apply", file]), "node 5: has the configuration of this date\n");
     assert_eq!(printed(&wire, &["net", "check", file]), "1 node is as the file says\n");
     assert_eq!(
         printed(&wire, &["read", "1020:1", "-n", "5"]).split(" = ").nth(1),
         Some("15668 (00003D34h)\n")
     );
+}
+
+/// The identity is read before the first node is changed, and not again when the node is configured.
+#[test]
+fn apply_reads_the_identity_of_a_node_once() {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("once.yaml");
+    let identity = "{ device_type: 0x20194, vendor: 0, product: 1, revision: 0x10000, serial: 0x12345678 }";
+    fs::write(&path, format!("nodes:\n  - node: 5\n    identity: {identity}\n    heartbeat: 500\n")).unwrap();
+    let wire = Wire::new(Pressure::new(5));
+    let reads = Rc::new(RefCell::new(BTreeMap::new()));
+    let counted = Rc::clone(&reads);
+    wire.disturb(move |frame| {
+        if let (0x605, &[0x40, 0x18, 0x10, sub, ..]) = (frame.id(), frame.data()) {
+            *counted.borrow_mut().entry(sub).or_insert(0) += 1;
+        }
+        Fate::Arrives
+    });
+    assert_eq!(printed(&wire, &["net", "apply", path.to_str().unwrap()]), "node 5: 1 change, read back\n");
+    assert_eq!(*reads.borrow(), BTreeMap::from([(1, 1), (2, 1), (3, 1), (4, 1)]));
 }
 
 #[test]
@@ -261,7 +282,7 @@ fn the_watch_configures_and_starts_a_node_that_returns() {
         nodes[1] = devices(2).remove(1);
     });
     let lines = printed(&wire, &["net", "apply", file.to_str().unwrap(), "--watch", "--for", "3"]);
-    assert!(lines.contains("node 2: 2 writes, read back, saved"), "{lines}");
+    assert!(lines.contains("node 2: 2 changes, read back, saved"), "{lines}");
     wire.station(|nodes| assert_eq!(nodes[1].state(), canopen::nmt::State::Operational));
 }
 

@@ -43,7 +43,7 @@ fn with_eds<S: Station + 'static>(wire: &Wire<S>, name: &str, line: &[&str]) -> 
 }
 
 #[test]
-fn every_data_sheet_of_the_corpus_makes_a_device_that_answers_as_it_says() {
+fn every_data_sheet_of_the_corpus_makes_a_device_with_its_answers() {
     let folder = std::fs::read_dir(corpus("")).expect("the corpus");
     let mut count = 0;
     for path in folder.map(|entry| entry.expect("an entry").path()) {
@@ -179,7 +179,7 @@ fn a_dbc_file_has_the_nodes_that_answer() {
     let (lines, _) = run(&wire, &["map", "--json", "--dbc", path, "-n", "2,9", &eds[0], &eds[1]]);
     let line: serde_json::Value = serde_json::from_str(lines.trim()).expect("the node that is left out");
     assert_eq!((&line["node"], &line["exit_code"]), (&9.into(), &3.into()));
-    // Without any node the file stays as it is.
+    // Without any node the file is unchanged.
     let before = std::fs::read(&file).unwrap();
     assert_eq!(failed(&wire, &["map", "--dbc", path, "-n", "8,9", &eds[0], &eds[1]]).0, 3);
     assert_eq!(std::fs::read(&file).unwrap(), before);

@@ -28,7 +28,7 @@ fn texts(frames: &[(u16, &[u8])]) -> Vec<String> {
 
 /// CiA 417 fixes the CAN-ID of the car position. It is not that of TPDO 1 of node 12.
 #[test]
-fn a_pdo_of_a_lift_tells_no_node() {
+fn a_pdo_of_a_lift_has_no_node() {
     let mut decoder = Decoder::default();
     let position = Frame::new(0x18C, &[0; 4]).expect("a frame");
     let node = |decoder: &mut Decoder| decoder.on_frame(&position, Instant(0))[0].node.map(NodeId::get);

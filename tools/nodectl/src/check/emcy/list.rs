@@ -1,7 +1,7 @@
 //! Checks of 1003h, the list of errors.
 
 use super::super::prelude::*;
-use super::provoke::{LIFE, heartbeat_is_back, lose_heartbeat, nobody};
+use super::provoke::{LIFE, heartbeat_is_back, lose_heartbeat, unused_node_id};
 
 pub(super) const CHECKS: &[Check] = &[
     Check::new("EMC-40", "1003h:0 counts, and no entry beyond can be read", "CiA 301, 7.5.2.4", counts),
@@ -28,7 +28,7 @@ fn counts(s: &mut Subject<'_>) -> Outcome {
 
 fn newest(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1003, 0)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     let entry = s.number(0x1003, 1)?;
     ensure(entry & 0xFFFF == u32::from(LIFE), "8130h in the low word", format!("{entry:08X}h"))
@@ -36,7 +36,7 @@ fn newest(s: &mut Subject<'_>) -> Outcome {
 
 fn clears(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1003, 0)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     heartbeat_is_back(s, node)?;
     s.try_write(0x1003, 0, &[0])?.map_err(|refusal| fail("1003h:0 takes 0", refusal))?;
@@ -58,7 +58,7 @@ fn refuses(s: &mut Subject<'_>) -> Outcome {
 fn one_more(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1003, 0)?;
     s.try_write(0x1003, 0, &[0])?.map_err(|refusal| fail("1003h:0 takes 0", refusal))?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     s.holds(0x1003, 0, 1)
 }
@@ -67,7 +67,7 @@ fn moves_down(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1003, 0)?;
     s.need(0x1003, 2).or_else(|stop| if matches!(stop, Stop::Skipped(_)) { Ok(()) } else { Err(stop) })?;
     s.try_write(0x1003, 0, &[0])?.map_err(|refusal| fail("1003h:0 takes 0", refusal))?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     let first = s.number(0x1003, 1)?;
     heartbeat_is_back(s, node)?;
@@ -81,7 +81,7 @@ fn moves_down(s: &mut Subject<'_>) -> Outcome {
 
 fn read_only(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1003, 0)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     s.refuses(0x1003, 1, 0, &[abort::READ_ONLY])
 }

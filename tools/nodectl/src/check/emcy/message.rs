@@ -1,7 +1,7 @@
 //! Checks of the EMCY messages.
 
 use super::super::prelude::*;
-use super::provoke::{LIFE, codes, heartbeat_is_back, lose_heartbeat, messages, nobody};
+use super::provoke::{LIFE, codes, heartbeat_is_back, lose_heartbeat, messages, unused_node_id};
 
 pub(super) const CHECKS: &[Check] = &[
     Check::new("EMC-20", "An error sends an EMCY with its code", "CiA 301, table 26", code),
@@ -21,14 +21,14 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn code(s: &mut Subject<'_>) -> Outcome {
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     let codes = codes(s, mark);
     ensure(codes.contains(&LIFE), "EMCY 8130h", format!("{codes:04X?}"))
 }
 
 fn once(s: &mut Subject<'_>) -> Outcome {
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     s.pass(500)?;
     let count = codes(s, mark).iter().filter(|code| **code == LIFE).count();
@@ -36,7 +36,7 @@ fn once(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn eight_bytes(s: &mut Subject<'_>) -> Outcome {
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     let messages = messages(s, mark);
     ensure(!messages.is_empty(), "an EMCY", "none")?;
@@ -45,7 +45,7 @@ fn eight_bytes(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn register(s: &mut Subject<'_>) -> Outcome {
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     let told = messages(s, mark).last().and_then(|heard| heard.frame.data().get(2).copied());
     let told = told.ok_or_else(|| fail("an EMCY with an error register", "none"))?;
@@ -58,7 +58,7 @@ fn reset(s: &mut Subject<'_>) -> Outcome {
     if before != 0 {
         return Err(skip("the device has another error"));
     }
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     let mark = heartbeat_is_back(s, node)?;
     let codes = codes(s, mark);
@@ -67,7 +67,7 @@ fn reset(s: &mut Subject<'_>) -> Outcome {
 
 fn register_back(s: &mut Subject<'_>) -> Outcome {
     let before = s.number(0x1001, 0)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     heartbeat_is_back(s, node)?;
     s.holds(0x1001, 0, before)
@@ -75,7 +75,7 @@ fn register_back(s: &mut Subject<'_>) -> Outcome {
 
 fn stopped(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     if s.try_read(0x1016, 1)?.is_err() {
         return Err(skip("no error can be caused from the bus: the device has no 1016h"));
     }
@@ -91,7 +91,7 @@ fn stopped(s: &mut Subject<'_>) -> Outcome {
 fn inhibited(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1015, 0)?;
     s.set(0x1015, 0, 10_000)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     heartbeat_is_back(s, node)?;
     s.pass(1500)?;

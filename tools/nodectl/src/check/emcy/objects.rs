@@ -1,7 +1,7 @@
 //! Checks of 1001h, 1014h and 1015h.
 
 use super::super::prelude::*;
-use super::provoke::{LIFE, codes, lose_heartbeat, nobody};
+use super::provoke::{LIFE, codes, lose_heartbeat, unused_node_id};
 
 pub(super) const CHECKS: &[Check] = &[
     Check::new("EMC-01", "1014h is 80h and the node-ID", "CiA 301, 7.5.2.17", cob_id),
@@ -39,7 +39,7 @@ fn register_clear(s: &mut Subject<'_>) -> Outcome {
 
 fn locked(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1014, 0)?;
-    let other = 0x80 + u32::from(nobody(s));
+    let other = 0x80 + u32::from(unused_node_id(s));
     s.refuses(
         0x1014,
         0,
@@ -62,7 +62,7 @@ fn off(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1014, 0)?;
     let before = s.number(0x1014, 0)?;
     s.set_if_supported(0x1014, 0, before | OFF)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     let codes = codes(s, mark);
     ensure(codes.is_empty(), "no EMCY", format!("{codes:04X?}"))
@@ -74,7 +74,7 @@ fn moved(s: &mut Subject<'_>) -> Outcome {
     s.set_if_supported(0x1014, 0, before | OFF)?;
     s.set_if_supported(0x1014, 0, 0x6D0 | OFF)?;
     s.set_if_supported(0x1014, 0, 0x6D0)?;
-    let node = nobody(s);
+    let node = unused_node_id(s);
     let mark = lose_heartbeat(s, node)?;
     let moved = s.heard(mark, 0x6D0);
     let is_told = moved.iter().any(|heard| heard.frame.data().starts_with(&LIFE.to_le_bytes()));
@@ -88,7 +88,7 @@ fn inhibit(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn generic(s: &mut Subject<'_>) -> Outcome {
-    let node = nobody(s);
+    let node = unused_node_id(s);
     lose_heartbeat(s, node)?;
     let register = s.number(0x1001, 0)?;
     ensure(register & 1 != 0, "bit 0 is set while there is an error", format!("{register:02X}h"))

@@ -43,6 +43,6 @@ pub(super) fn codes(s: &Subject<'_>, mark: Mark) -> Vec<u16> {
 }
 
 /// A node-ID that no node has.
-pub(super) fn nobody(s: &Subject<'_>) -> u16 {
+pub(super) fn unused_node_id(s: &Subject<'_>) -> u16 {
     if s.id() == 0x6F { 0x6E } else { 0x6F }
 }

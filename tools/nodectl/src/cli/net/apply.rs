@@ -1,5 +1,6 @@
 //! `nodectl net apply`: configures and starts the nodes of a file.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use canopen::NodeId;
@@ -21,7 +22,7 @@ use crate::text::counted;
 #[derive(Serialize)]
 struct Done {
     node: u8,
-    writes: usize,
+    changes: usize,
     /// The node had the date of the file, and nothing was compared.
     has_date: bool,
     saved: bool,
@@ -36,14 +37,14 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
         print(session, findings)
     };
     tell(session, &of_bus(plan, &found))?;
-    verify(session, plan, &found, how)?;
+    let mut verified = verify(session, plan, &found, how)?;
     let (mut configured, mut may_start) = (Vec::new(), true);
     for planned in &plan.nodes {
         if !is_there(&found, planned.node) {
             may_start &= planned.member.optional;
             continue;
         }
-        let findings = configure(session, plan, planned, how.all)?;
+        let findings = configure(session, plan, planned, verified.remove(&planned.node), how.all)?;
         tell(session, &findings)?;
         may_start &= findings.is_empty() || planned.member.optional;
         if findings.is_empty() {
@@ -64,26 +65,31 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
     end(count)
 }
 
+/// The identities that are read already, as findings.
+type Verified = BTreeMap<NodeId, Vec<Finding>>;
+
 /// Looks for mistakes of the file at nodes whose data sheet depends on their identity, before any node is changed.
-fn verify(session: &mut Session, plan: &Plan, found: &Found, how: &Applied) -> Result<(), Failure> {
+fn verify(session: &mut Session, plan: &Plan, found: &Found, how: &Applied) -> Result<Verified, Failure> {
+    let mut verified = Verified::new();
     let is_open = |planned: &&PlannedNode| planned.catalogue.is_none() && is_there(found, planned.node);
     for planned in plan.nodes.iter().filter(is_open) {
         session.begin_all();
         match verify_one(session, planned, how) {
             // The configuration of the node reports it.
             Err(failure @ Failure::Sdo(_)) => drop(Finding::of_failure(planned.node, failure)?),
-            result => result?,
+            result => drop(verified.insert(planned.node, result?)),
         }
     }
-    Ok(())
+    Ok(verified)
 }
 
-fn verify_one(session: &mut Session, planned: &PlannedNode, how: &Applied) -> Result<(), Failure> {
-    if of_identity(session, planned)?.is_empty() {
+fn verify_one(session: &mut Session, planned: &PlannedNode, how: &Applied) -> Result<Vec<Finding>, Failure> {
+    let findings = of_identity(session, planned)?;
+    if findings.is_empty() {
         let catalogue = catalogue(session, planned)?;
         planned.wanted(&catalogue).map_err(|error| Failure::file(&how.file, error))?;
     }
-    Ok(())
+    Ok(findings)
 }
 
 /// Starts the nodes with one command, if all nodes are to be started; otherwise one after the other.
@@ -97,15 +103,17 @@ fn start_all(session: &mut Session, plan: &Plan, configured: &[&PlannedNode]) ->
     Ok(())
 }
 
-/// Configures a node, and starts it where each is started on its own. What the node does not take is a finding.
+/// Configures a node, and starts it where each is started on its own. A refusal of the node is a finding. The identity is
+/// read where it is not `verified`.
 pub(super) fn configure(
     session: &mut Session,
     plan: &Plan,
     planned: &PlannedNode,
+    verified: Option<Vec<Finding>>,
     all: bool,
 ) -> Result<Vec<Finding>, Failure> {
     session.begin_all();
-    match configure_one(session, planned, all) {
+    match configure_one(session, planned, verified, all) {
         Ok(Ok(mut done)) => {
             done.started = plan.start == Start::Each && planned.member.start;
             if done.started {
@@ -123,15 +131,16 @@ pub(super) fn configure(
 fn configure_one(
     session: &mut Session,
     planned: &PlannedNode,
+    verified: Option<Vec<Finding>>,
     all: bool,
 ) -> Result<Result<Done, Vec<Finding>>, Failure> {
     let (node, member) = (planned.node, &planned.member);
-    let findings = of_identity(session, planned)?;
+    let findings = verified.map_or_else(|| of_identity(session, planned), Ok)?;
     if !findings.is_empty() {
         return Ok(Err(findings));
     }
     let catalogue = catalogue(session, planned)?;
-    let done = |writes, has_date, saved| Done { node: node.get(), writes, has_date, saved, started: false };
+    let done = |changes, has_date, saved| Done { node: node.get(), changes, has_date, saved, started: false };
     let wants_date = member.date.filter(|_| PlannedNode::has_date(&catalogue));
     if wants_date.is_some() && !all && date(session, node)? == wants_date {
         return Ok(Ok(done(0, true, false)));
@@ -142,15 +151,15 @@ fn configure_one(
     }
     let wanted = planned.wanted(&catalogue)?;
     let read = |session: &mut Session| values(session, node, &catalogue, &wanted);
-    let mut writes = bring(session, node, catalogue.sheet(), &wanted, read)?.len();
+    let mut changes = bring(session, node, catalogue.sheet(), &wanted, read)?;
     if let Some(date) = wants_date {
-        writes += write_date(session, node, date)?;
+        changes += write_date(session, node, date)?;
     }
-    let is_saved = member.save && writes > 0;
+    let is_saved = member.save && changes > 0;
     if is_saved {
         sign(session, node, Order::Save, Group::All)?;
     }
-    Ok(Ok(done(writes, false, is_saved)))
+    Ok(Ok(done(changes, false, is_saved)))
 }
 
 /// Writes the date of the configuration as the last value: a device clears it with each change.
@@ -162,15 +171,15 @@ fn write_date(session: &mut Session, node: NodeId, date: Date) -> Result<usize, 
     Ok(2)
 }
 
-/// `node 5: 7 writes, read back, saved, started`
+/// `node 5: 7 changes, read back, saved, started`
 impl fmt::Display for Done {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let saved = if self.saved { ", saved" } else { "" };
         let started = if self.started { ", started" } else { "" };
-        let what = match self.writes {
+        let what = match self.changes {
             _ if self.has_date => "has the configuration of this date".to_owned(),
             0 => "has it already".to_owned(),
-            writes => format!("{}, read back", counted(writes, "write", "writes")),
+            changes => format!("{}, read back", counted(changes, "change", "changes")),
         };
         write!(f, "node {}: {what}{saved}{started}", self.node)
     }

@@ -162,7 +162,11 @@ pub(super) fn of_identity(session: &mut Session, planned: &PlannedNode) -> Resul
         if wanted.is_none() && sheet.is_none() {
             continue;
         }
-        let is = session.word(node, place)?;
+        let is = match what {
+            What::Vendor => session.device(node)?.0,
+            What::Product => session.device(node)?.1,
+            _ => session.word(node, place)?,
+        };
         let differs = |wanted: Option<u32>| wanted.filter(|wanted| Some(*wanted) != is);
         let words = |wanted: u32| format!("{} instead of {wanted:08X}h", super::super::output::hex(is));
         if let Some(wanted) = differs(wanted) {

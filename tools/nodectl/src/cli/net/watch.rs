@@ -62,7 +62,8 @@ fn hear(
     let was_lost = std::mem::take(&mut watched.is_lost);
     if state == State::Initialising {
         tell(session, planned, "booted")?;
-        let findings = configure(session, plan, planned, false)?;
+        session.forget(planned.node);
+        let findings = configure(session, plan, planned, None, false)?;
         print(session, &findings)?;
         if findings.is_empty() && plan.start == Start::All && planned.member.start {
             send(&mut session.network, Command::Start, Some(planned.node))?;

@@ -2,16 +2,22 @@
 
 import { button, el, field } from "../dom.js";
 import { offer } from "../file.js";
-import { address } from "../format.js";
+import { address, hex } from "../format.js";
 import { outcome } from "../outcome.js";
+
+/** The number of warnings that are shown. */
+const WARNINGS = 5;
 
 export function dcfTools(bus, onApplied) {
   const result = outcome();
   const plan = el("div");
   const steps = ({ done, all }) => result.busy(`${done} of ${all} objects`);
   const down = (all) => save(bus, all, result, steps);
-  const file = el("input", { type: "file", accept: ".dcf,.eds,.txt" });
+  // A file that was corrected may be chosen again.
+  const file = el("input", { type: "file", accept: ".dcf,.eds,.txt", on: { click: () => { file.value = ""; } } });
   file.addEventListener("change", () => file.files[0] && compare(bus, file.files[0], { result, plan, steps, onApplied }));
+  // The changes are those of one node.
+  bus.on("chosen", () => (plan.replaceChildren(), result.clear()));
   return el("details", { class: "box" }, el("summary", {}, "Configuration file (DCF)"),
     el("div", { class: "bar" }, button("Save what differs", () => down(false)), button("Save all", () => down(true)), field("Apply a file", file)),
     result.line, plan);
@@ -26,19 +32,32 @@ async function save(bus, all, result, steps) {
 async function compare(bus, file, { result, plan, steps, onApplied }) {
   const keys = { node: bus.chosen, text: await file.text() };
   plan.replaceChildren();
-  const said = ({ steps, warnings }) => [steps.length ? `${steps.length} objects would be written` : "the node is configured like this already", ...warnings].join("; warning: ");
+  const said = ({ changes }) => (changes.length ? `${objects(changes.length)} would change` : "the node is configured like this already");
   const answer = await result.of(`comparing ${file.name}`, bus.request("apply", { ...keys, dry_run: true }, steps), said);
-  if (!answer?.steps.length) return;
+  if (!answer) return;
+  if (bus.chosen !== keys.node) return result.clear();
+  if (answer.warnings.length) plan.append(warningList(answer.warnings));
+  if (!answer.changes.length) return;
   const store = el("input", { type: "checkbox" });
   const apply = async () => {
-    const done = await result.of("writing", bus.request("apply", { ...keys, save: store.checked }, steps), ({ writes, saved }) => `${writes} objects written${saved ? ", saved" : ""}`);
+    const done = await result.of("writing", bus.request("apply", { ...keys, save: store.checked }, steps), ({ changed, saved }) => `${objects(changed)} changed${saved ? ", saved" : ""}`);
     if (done) (plan.replaceChildren(), onApplied());
   };
-  plan.append(stepTable(answer.steps), el("div", { class: "bar" }, el("label", {}, store, " save in the node"), button("Write these", apply)));
+  plan.append(changeTable(answer.changes), el("div", { class: "bar" }, el("label", { class: "switch" }, store, " save in the node"), button("Write these", apply)));
 }
 
-function stepTable(steps) {
-  const rows = steps.map(({ index, sub, path, value }) => el("tr", {}, el("th", { scope: "row" }, address(index, sub)), el("td", {}, path), el("td", { class: "number" }, String(value))));
-  const head = el("tr", {}, ["Object", "Name", "Value"].map((name) => el("th", { scope: "col" }, name)));
-  return el("div", { class: "wide" }, el("table", {}, el("caption", {}, "What would be written"), el("thead", {}, head), el("tbody", {}, rows)));
+function objects(count) {
+  return count === 1 ? "1 object" : `${count} objects`;
+}
+
+function warningList(warnings) {
+  const more = warnings.length > WARNINGS ? [`and ${warnings.length - WARNINGS} more warnings`] : [];
+  return el("ul", { data: { kind: "warn" } }, [...warnings.slice(0, WARNINGS).map((warning) => `warning: ${warning}`), ...more].map((line) => el("li", {}, line)));
+}
+
+function changeTable(changes) {
+  const number = (value) => el("td", { class: "number" }, value > 0xFFFF && Number.isInteger(value) ? `${value} (${hex(value)})` : String(value ?? "-"));
+  const rows = changes.map(({ index, sub, path, present, value }) => el("tr", {}, el("th", { scope: "row" }, address(index, sub)), el("td", {}, path), number(present), number(value)));
+  const head = el("tr", {}, ["Object", "Name", "Present", "New"].map((name, column) => el("th", { scope: "col", class: column > 1 && "number" }, name)));
+  return el("div", { class: "wide" }, el("table", { class: "changes" }, el("caption", {}, "Changes"), el("thead", {}, head), el("tbody", {}, rows)));
 }

@@ -11,7 +11,7 @@ use crate::cli::serve::request::Apply;
 use crate::cli::session::loss;
 use crate::cli::store::{Group, Order, sign};
 use crate::cli::{Failure, Session};
-use crate::configuration::{Configuration, plan};
+use crate::configuration::{Configuration, Difference};
 use crate::object::at;
 
 /// Reads the data sheet and the configuration of a node.
@@ -80,26 +80,27 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
         if let Some(words) = mismatch.filter(|_| !how.force) {
             return Err(Failure::Usage(format!("the file is {words}")));
         }
-        let steps = if how.dry_run {
-            plan(&sheet, &values(context, node, &sheet)?, &Configuration::of_sheet(&sheet, node))
-        } else {
-            let mut counter = context.counter();
-            let read = |session: &mut Session| session.configuration_with(node, &sheet, &mut counter);
-            bring(&mut context.session, node, &sheet, &Configuration::of_sheet(&sheet, node), read)?
-        };
-        let saved = how.save && !how.dry_run;
-        if saved {
+        let wanted = Configuration::of_sheet(&sheet, node);
+        if how.dry_run {
+            let changes = values(context, node, &sheet)?.changes(&wanted);
+            let rows: Vec<Json> = changes
+                .into_iter()
+                .map(|Difference { at, first, second }| {
+                    json!({
+                        "index": at.index, "sub": at.sub, "path": path(&sheet, at),
+                        "present": first, "value": second,
+                    })
+                })
+                .collect();
+            let warnings: Vec<String> = sheet.warnings.iter().map(ToString::to_string).collect();
+            return Ok(json!({ "changes": rows, "warnings": warnings }));
+        }
+        let mut counter = context.counter();
+        let read = |session: &mut Session| session.configuration_with(node, &sheet, &mut counter);
+        let changed = bring(&mut context.session, node, &sheet, &wanted, read)?;
+        if how.save {
             sign(&mut context.session, node, Order::Save, Group::All)?;
         }
-        let writes = if how.dry_run { 0 } else { steps.len() };
-        let rows: Vec<Json> = steps
-            .iter()
-            .map(|step| {
-                let Multiplexer { index, sub } = step.at;
-                json!({ "index": index, "sub": sub, "path": path(&sheet, step.at), "value": step.value })
-            })
-            .collect();
-        let warnings: Vec<String> = sheet.warnings.iter().map(ToString::to_string).collect();
-        Ok(json!({ "steps": rows, "writes": writes, "saved": saved, "warnings": warnings }))
+        Ok(json!({ "changed": changed, "saved": how.save }))
     }))
 }

@@ -97,7 +97,7 @@ impl Pump {
         }
     }
 
-    /// Answers a request at once if it needs no bus, else makes a job of it.
+    /// Answers a request that needs no bus at once. Any other request becomes a job.
     pub(super) fn serve(&mut self, asker: Asker, what: What) {
         match what {
             What::Follow { signals } => {
