@@ -227,8 +227,7 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.limits.is_same(b.limits)
 }
 
-/// Whether two rows have the same attributes. Rows of a series are equal as they are written; only then is nothing
-/// computed.
+/// Whether two rows have the same attributes. Equal rows, as in a series, need no computation.
 pub(super) const fn is_alike(a: &Object, b: &Object) -> bool {
     let same_limits = match (a.limits, b.limits) {
         (None, None) => true,

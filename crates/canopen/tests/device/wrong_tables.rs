@@ -80,7 +80,7 @@ fn a_reserved_transmission_type_does_not_compile() {
 }
 
 #[test]
-fn a_pdo_that_is_valid_can_be_sent() {
+fn a_valid_pdo_can_be_sent() {
     let mut rows = objects::tpdo(1, &[]);
     rows[1] = rows[1].default(DefaultValue::NodeId(0x180));
     assert_error(&[&rows], "1A00h:0: the PDO is valid, but maps no object");
@@ -160,7 +160,7 @@ fn a_missing_field_is_named() {
 }
 
 #[test]
-fn a_service_has_the_rows_that_it_needs() {
+fn a_service_needs_all_its_rows() {
     let message = "1202h:0: further SDO servers begin at 1201h and have no gap";
     assert_error(&[&objects::sdo_server(3)], message);
     assert_eq!(compile_error(&[&objects::sdo_server(2), &objects::sdo_server(3)]), None);
@@ -228,7 +228,7 @@ fn the_cob_id_of_a_service_can_be_used() {
 }
 
 #[test]
-fn an_entry_that_could_not_work_does_not_compile() {
+fn an_entry_without_any_use_does_not_compile() {
     let watches = objects::heartbeat_consumer::<4>();
     let gap: Vec<Object> = watches.into_iter().filter(|row| row.sub != 2).collect();
     assert_error(&[&gap], "1016h:3: the heartbeats to monitor have no gap");
