@@ -166,7 +166,11 @@ impl Clock {
     /// The instant of a tick.
     #[inline]
     pub(crate) fn instant(&self, tick: Tick) -> Instant {
-        if tick == Tick::NEVER { Instant::NEVER } else { Instant(self.epoch.wrapping_add((!tick.0).into())) }
+        if tick == Tick::NEVER {
+            Instant::NEVER
+        } else {
+            Instant(self.epoch.saturating_add((!tick.0).into()))
+        }
     }
 }
 
