@@ -172,17 +172,17 @@ impl<D: Definition> Inner<D> {
         little_endian(field.get(self.image.as_ref()))
     }
 
-    /// Changes the NMT state.
+    /// Changes the NMT state. Initialising has no heartbeat, and no boot-up message before [`Device::start`](super::Device).
     #[inline(never)]
     pub(super) fn enter(&mut self, state: State) {
+        if state == State::Initialising {
+            self.heartbeat = heartbeat::Producer::new();
+        }
         if state == self.state {
             return;
         }
         let had_services = self.state.has_services();
         (self.state, self.services_due) = (state, STALE);
-        if state == State::Initialising {
-            self.heartbeat = heartbeat::Producer::new();
-        }
         if Self::has(Services::SYNC_PRODUCER) && had_services != state.has_services() {
             self.restart_sync();
         }
