@@ -190,3 +190,47 @@ fn the_inhibit_time_separates_messages() {
     bench.bus(BusEvent::Overrun);
     assert_eq!(bench.times_of(0x085, Duration::from_millis(30)), [0]);
 }
+
+/// The error codes of the EMCYs since the last call.
+fn codes(bench: &mut Bench) -> Vec<u16> {
+    let emcys = bench.sent().into_iter().filter(|(id, _)| *id == 0x085);
+    emcys.map(|(_, data)| u16::from_le_bytes([data[0], data[1]])).collect()
+}
+
+/// Two EMCYs for each lost frame would fill the bus that has already too many frames, and the list of errors.
+#[test]
+fn lost_frames_are_one_fault_until_a_quiet_half_second() {
+    let mut bench = Bench::booted();
+    for _ in 0..1000 {
+        bench.bus(BusEvent::Overrun);
+        bench.run(Duration::from_millis(1));
+    }
+    assert_eq!(codes(&mut bench), [0x8110]);
+    assert_eq!(bench.read(0x1001, 0), Ok(vec![0x11]));
+    bench.run(Duration(498_999));
+    assert_eq!(codes(&mut bench), []);
+    bench.run(Duration(1));
+    assert_eq!(codes(&mut bench), [0]);
+    assert_eq!((bench.read(0x1001, 0), bench.read(0x1003, 0)), (Ok(vec![0]), Ok(vec![1])));
+    bench.bus(BusEvent::Overrun);
+    assert_eq!(codes(&mut bench), [0x8110]);
+}
+
+#[test]
+fn the_quiet_time_of_lost_frames_ends_in_every_nmt_state() {
+    for command in [1, 2, 0x80] {
+        let mut bench = Bench::booted();
+        bench.bus(BusEvent::Overrun);
+        bench.nmt(command);
+        bench.run(Duration::from_millis(500));
+        bench.nmt(0x80);
+        assert_eq!(codes(&mut bench), [0x8110, 0], "command {command:02X}h");
+    }
+    let mut bench = Bench::booted();
+    bench.bus(BusEvent::Overrun);
+    bench.nmt(0x82);
+    bench.run(Duration::from_millis(1000));
+    bench.start();
+    bench.run(Duration::from_millis(1));
+    assert_eq!(codes(&mut bench), [0x8110, 0x8110, 0], "the reset reports the active faults again");
+}

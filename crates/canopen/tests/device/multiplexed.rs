@@ -188,6 +188,19 @@ fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
     }
 }
 
+#[test]
+fn rejected_multiplexed_pdos_are_one_fault_until_a_quiet_half_second() {
+    let mut bench = receiver(DESTINATION);
+    for _ in 0..100 {
+        bench.receive(Frame::new(RPDO, &[0x80 | ID, 0x00, 0x70, 0, 1, 2, 3, 4]).unwrap());
+        bench.run(Duration::from_millis(10));
+    }
+    let emcys = |bench: &mut Bench| bench.take().iter().filter(|frame| frame.id() == 0x085).count();
+    assert_eq!(emcys(&mut bench), 1);
+    bench.run(Duration::from_millis(490));
+    assert_eq!(emcys(&mut bench), 1, "the end");
+}
+
 /// 6203h accepts -5 to 5, and the application rejects 13 at 6201h.
 #[test]
 fn a_value_that_the_object_rejects_is_an_error_for_the_node_that_is_addressed() {
