@@ -111,7 +111,7 @@ impl Consumer {
         let half = period / 2;
         (self.due, self.rest) = match period {
             0 => (Tick::NEVER, 0),
-            ..=PART => (now.plus(Span(period + half)), 0),
+            1..=PART => (now.plus(Span(period + half)), 0),
             _ => (now.plus(Span(half)), period),
         };
         Ok(Sync { counter })

@@ -150,6 +150,21 @@ fn after_the_window_a_synchronous_pdo_is_dropped() {
     }
 }
 
+#[test]
+fn the_end_of_the_window_belongs_to_the_window() {
+    for (passed, sent) in [(2000, 1), (2001, 0)] {
+        let mut bench = bench(1, 0, false);
+        bench.write32(0x1007, 0, 2000).unwrap();
+        bench.take();
+        bench.out.room = 0;
+        bench.sync();
+        bench.now = bench.now + Duration(passed);
+        bench.out.room = 10;
+        bench.poll();
+        assert_eq!(bench.take().iter().filter(|frame| frame.id() == TPDO).count(), sent, "after {passed} us");
+    }
+}
+
 /// The usual sequence of a master that starts again: its SYNC is away, and the NMT state changes meanwhile.
 #[test]
 fn a_sync_in_another_nmt_state_ends_the_fault_of_a_missing_one() {
