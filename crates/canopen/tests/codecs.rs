@@ -197,6 +197,7 @@ proptest! {
     fn frames(id in 0..0x900_u16, data in prop::collection::vec(any::<u8>(), 0..=9)) {
         let is_valid = id <= 0x7FF && data.len() <= 8;
         let frame = Frame::new(id, &data);
+        prop_assert_eq!(frame.map(|frame| frame.is_empty()), is_valid.then_some(data.is_empty()));
         prop_assert_eq!(frame.map(|frame| (frame.id(), frame.data().to_vec())), is_valid.then_some((id, data)));
         prop_assert_eq!(CanId::new(id).map(CanId::get), (id <= 0x7FF).then_some(id));
     }

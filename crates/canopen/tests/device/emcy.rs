@@ -73,7 +73,7 @@ fn messages_wait_for_room_in_order_and_the_oldest_are_kept() {
 }
 
 #[test]
-fn a_fault_that_is_still_there_after_a_reset_is_news_again() {
+fn an_active_fault_is_reported_again_after_a_reset() {
     let mut bench = Bench::booted();
     bench.raise(SENSOR_BREAK);
     bench.raise(PRESSURE_RAIL);
@@ -118,7 +118,7 @@ fn listed(bench: &mut Bench) -> Vec<u16> {
 }
 
 #[test]
-fn the_list_has_no_error_that_was_not_sent() {
+fn an_unsent_error_is_not_listed() {
     let mut bench = Bench::booted();
     bench.write32(0x1014, 0, 0x8000_0085).unwrap();
     bench.raise(SENSOR_BREAK);
@@ -137,7 +137,7 @@ fn the_list_has_no_error_that_was_not_sent() {
 }
 
 #[test]
-fn emcy_that_is_switched_on_reports_the_faults_that_are_present() {
+fn enabling_1014h_reports_the_active_faults() {
     let mut bench = Bench::booted();
     bench.write32(0x1014, 0, 0x8000_0085).unwrap();
     bench.write32(0x1600, 1, 0x6200_0010).unwrap();
@@ -161,7 +161,7 @@ fn emcy_that_is_switched_on_reports_the_faults_that_are_present() {
 }
 
 #[test]
-fn a_shorter_inhibit_time_releases_a_message_that_waits() {
+fn a_shorter_inhibit_time_releases_a_waiting_message() {
     for (inhibit, expected) in [(0_u16, vec![0]), (2000, vec![100_000])] {
         let mut bench = Bench::booted();
         bench.write(0x1015, 0, &10_000_u16.to_le_bytes()).unwrap();
