@@ -421,3 +421,15 @@ fn an_error_with_stopped_in_1029h_ends_the_transfers() {
     let _ = bench.device.finish(Ok(()), bench.now, &mut bench.out);
     assert!(bench.take().iter().all(|frame| frame.id() != 0x585));
 }
+
+#[test]
+fn a_start_without_a_node_id_forgets_the_boot_up_message() {
+    let mut bench = Bench::unstarted();
+    bench.out.room = 0;
+    bench.start();
+    bench.device.set_node_id(None);
+    bench.start();
+    bench.out.room = 10;
+    bench.run(Duration::from_millis(5000));
+    assert_eq!(bench.sent(), []);
+}
