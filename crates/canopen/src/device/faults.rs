@@ -132,8 +132,8 @@ impl<D: Definition> Inner<D> {
         self.clear(Fault::BusOffRecovered, now);
     }
 
-    /// Reports an event: lost frames, or a multiplexed PDO that is not taken. The fault ends after a quiet time, because a
-    /// burst of events is one fault: two EMCYs for each event would flood the bus, and the list of errors (1003h).
+    /// Reports an event: lost frames, or a multiplexed PDO that is not taken. Both faults end after a quiet time without
+    /// either event, because a burst is one fault: two EMCYs for each event would flood the bus and the list of errors (1003h).
     #[inline(never)]
     pub(super) fn report(&mut self, fault: Fault, now: Tick) {
         self.raise(fault, now);

@@ -1,4 +1,4 @@
-//! A transmit queue that takes no frame for a long time, with every service, at any moment.
+//! A transmit queue without room for a long time, with every service, at any moment.
 
 use std::collections::VecDeque;
 
@@ -52,7 +52,7 @@ const ROWS: &[Object] = canopen::rows!(
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 const CONTENT: [u8; 200] = [7; 200];
 
-/// The application: a domain, and one fault that stops the device.
+/// An application with a domain and with a fault that stops the device.
 #[derive(Default)]
 struct Product {
     states: Vec<State>,
@@ -167,7 +167,7 @@ impl Node {
         self.now = end;
     }
 
-    /// The frames sent. The boot-up message is the first of a start; only LSS has no NMT state.
+    /// The frames sent. The boot-up message is the first frame after a start, except for LSS responses.
     fn sent(&mut self) -> Result<Vec<Frame>, TestCaseError> {
         let mut sent = vec![];
         while let Some(frame) = self.out.frames.pop_front() {
@@ -411,7 +411,7 @@ proptest! {
         let lss = |request: LssRequest| request.encode();
         prop_assert_eq!(node.answer(0x7E5, &lss(LssRequest::SwitchGlobal { configuration: true }))?, None);
         prop_assert_eq!(node.answer(0x7E5, &lss(LssRequest::InquireNodeId))?, Some(0x5E));
-        // Every heartbeat and SYNC comes, and a TPDO of each type.
+        // Heartbeat, SYNC and TPDOs keep their periods.
         prop_assert_eq!(node.answer(0x605, &[0x2B, 0x17, 0x10, 0, 20, 0, 0, 0])?, Some(0x60));
         prop_assert_eq!(node.answer(0x605, &[0x23, 0x06, 0x10, 0, 0x10, 0x27, 0, 0])?, Some(0x60));
         prop_assert_eq!(node.answer(0x605, &[0x23, 0x05, 0x10, 0, 0x80, 0, 0, 0x40])?, Some(0x60));
@@ -464,7 +464,7 @@ fn exchange_step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// What a response of the SDO server says about the request before it.
+/// Checks a response of the SDO server against its request and the image.
 fn check_answer(request: &[u8], answer: &[u8], image: &[u8]) -> Result<(), TestCaseError> {
     prop_assert_eq!(&request[1..4], &answer[1..4], "the answer to another request: {:x?}", answer);
     let at = (u16::from_le_bytes([request[1], request[2]]), request[3]);
@@ -483,7 +483,7 @@ fn check_answer(request: &[u8], answer: &[u8], image: &[u8]) -> Result<(), TestC
 proptest! {
     #![proptest_config(repeatable())]
 
-    /// An answer is that to the last request, once, and a value that the server has accepted is in the image.
+    /// The server answers the last request, once. An accepted value is in the image.
     #[test]
     fn an_answer_of_a_full_queue_belongs_to_the_last_request(
         steps in prop::collection::vec(exchange_step(), 1..80),
