@@ -243,3 +243,17 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_fastscan_with_a_field_out_of_range_is_refused() {
+    let parse = |bit, part, next| lss::Request::parse([0x51, 1, 2, 3, 4, bit, part, next]);
+    for (bit, part, next) in [(31, 3, 3), (lss::Request::CONFIRM, 0, 0)] {
+        assert_eq!(
+            parse(bit, part, next),
+            Some(lss::Request::Fastscan { value: 0x0403_0201, bit, part, next })
+        );
+    }
+    for (bit, part, next) in [(32, 0, 0), (127, 0, 0), (0, 4, 0), (0, 0, 4), (32, 4, 4)] {
+        assert_eq!(parse(bit, part, next), None, "bit {bit}, part {part}, next {next}");
+    }
+}

@@ -341,3 +341,13 @@ fn too_many_dictionaries_do_not_compile() {
     let message = "more than 64 dictionaries are compiled together";
     assert_eq!(table_error(&[row; 65]).as_deref(), Some(message));
 }
+
+#[test]
+fn rows_without_remote_frames_stay_without_them() {
+    let once = objects::without_remote(objects::tpdo(1, &[INPUT]));
+    assert_eq!(once[1].default, DefaultValue::NodeId(0x4000_0180));
+    assert_eq!(objects::without_remote(once)[1].default, once[1].default);
+    let off = objects::without_remote(objects::tpdo(5, &[]));
+    assert_eq!(off[1].default, DefaultValue::Integer(0xC000_0000));
+    assert_eq!(objects::without_remote(off)[1].default, off[1].default);
+}
