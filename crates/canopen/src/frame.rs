@@ -74,7 +74,7 @@ impl Frame {
         usize::from(len)
     }
 
-    /// Whether the frame carries no data.
+    /// Whether the data length code is 0.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

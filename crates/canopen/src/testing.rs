@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "is due")]
-    fn a_deadline_that_stays_in_the_past_is_an_error() {
+    fn a_deadline_in_the_past_is_an_error() {
         let _ = settle(Instant(100), || due(100));
     }
 }

@@ -22,8 +22,8 @@ impl Duration {
     }
 }
 
-/// Microseconds since start-up. 64 bits do not overflow in the life of a machine. A sum beyond the range is
-/// [`NEVER`](Instant::NEVER).
+/// Microseconds since start-up. 64 bits do not overflow in the life of a machine: a device works until 71 minutes before
+/// their end, in 584,000 years. A sum beyond the range is [`NEVER`](Instant::NEVER).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(pub u64);

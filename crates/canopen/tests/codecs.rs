@@ -197,6 +197,7 @@ proptest! {
     fn frames(id in 0..0x900_u16, data in prop::collection::vec(any::<u8>(), 0..=9)) {
         let is_valid = id <= 0x7FF && data.len() <= 8;
         let frame = Frame::new(id, &data);
+        prop_assert_eq!(frame.map(|frame| frame.is_empty()), is_valid.then_some(data.is_empty()));
         prop_assert_eq!(frame.map(|frame| (frame.id(), frame.data().to_vec())), is_valid.then_some((id, data)));
         prop_assert_eq!(CanId::new(id).map(CanId::get), (id <= 0x7FF).then_some(id));
     }
@@ -240,5 +241,19 @@ proptest! {
         } else {
             prop_assert_eq!(frame[0], 0);
         }
+    }
+}
+
+#[test]
+fn a_fastscan_with_a_field_out_of_range_is_refused() {
+    let parse = |bit, part, next| lss::Request::parse([0x51, 1, 2, 3, 4, bit, part, next]);
+    for (bit, part, next) in [(31, 3, 3), (lss::Request::CONFIRM, 0, 0)] {
+        assert_eq!(
+            parse(bit, part, next),
+            Some(lss::Request::Fastscan { value: 0x0403_0201, bit, part, next })
+        );
+    }
+    for (bit, part, next) in [(32, 0, 0), (127, 0, 0), (0, 4, 0), (0, 0, 4), (32, 4, 4)] {
+        assert_eq!(parse(bit, part, next), None, "bit {bit}, part {part}, next {next}");
     }
 }

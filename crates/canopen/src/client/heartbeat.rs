@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_heartbeat_is_one_byte_that_names_a_state() {
+    fn a_heartbeat_is_the_byte_of_a_state() {
         let parse = |id, data: &[u8]| Heartbeat::parse(&Frame::new(id, data).unwrap());
         let node = NodeId::new(5).unwrap();
         assert_eq!(parse(0x705, &[5]), Some(Heartbeat { node, state: State::Operational }));

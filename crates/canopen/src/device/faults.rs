@@ -6,7 +6,7 @@ use super::{Application, Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::emcy::{ErrorClass, Fault};
 use crate::nmt::State;
-use crate::{Instant, Tick};
+use crate::{Instant, Span, Tick};
 
 /// Error behaviour.
 const ERROR_BEHAVIOUR: u16 = 0x1029;
@@ -14,12 +14,15 @@ const ERROR_BEHAVIOUR: u16 = 0x1029;
 const TO_PRE_OPERATIONAL: u32 = 0;
 const TO_STOPPED: u32 = 2;
 
+/// How long no event may occur before its fault ends.
+const QUIET: Span = Span::from_millis(500);
+
 /// An event that the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BusEvent {
-    /// A received frame was lost.
+    /// Received frames were lost. The fault (8110h) ends when none was lost for half a second.
     Overrun,
     /// An error counter reached 96.
     Warning,
@@ -129,11 +132,19 @@ impl<D: Definition> Inner<D> {
         self.clear(Fault::BusOffRecovered, now);
     }
 
-    /// Reports a fault that is over immediately.
+    /// Reports an event: lost frames, or a multiplexed PDO that is not taken. Both faults end after a quiet time without
+    /// either event, because a burst is one fault: two EMCYs for each event would flood the bus and the list of errors (1003h).
     #[inline(never)]
     pub(super) fn report(&mut self, fault: Fault, now: Tick) {
         self.raise(fault, now);
-        self.clear(fault, now);
+        self.quiet_at = now.plus(QUIET);
+    }
+
+    /// The quiet time is over.
+    pub(super) fn end_events(&mut self, now: Tick) {
+        self.quiet_at = Tick::NEVER;
+        self.clear(Fault::Overrun, now);
+        self.clear(Fault::MpdoNotTaken, now);
     }
 
     // Not inlined: many callers, none of them time-critical.

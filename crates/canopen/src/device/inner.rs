@@ -30,6 +30,8 @@ pub struct Inner<D: Definition> {
     /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
     pub(super) process_due: Tick,
     pub(super) services_due: Tick,
+    /// The end of the faults that are events: [`Inner::report`].
+    pub(super) quiet_at: Tick,
     /// The first PDOs of the chains.
     pub(super) first_tpdos: Links,
     pub(super) first_rpdos: Links,
@@ -71,6 +73,7 @@ impl<D: Definition> Inner<D> {
             state: State::Initialising,
             process_due: Tick::NEVER,
             services_due: Tick::NEVER,
+            quiet_at: Tick::NEVER,
             heartbeat: heartbeat::Producer::new(),
             guarding: heartbeat::Guarding::new(),
             pending: Pending::new(),
@@ -99,6 +102,9 @@ impl<D: Definition> Inner<D> {
     pub(super) fn shift(&mut self, by: Span) {
         self.process_due.shift(by);
         self.services_due.shift(by);
+        if Self::has(Services::FAULTS) {
+            self.quiet_at.shift(by);
+        }
         self.heartbeat.shift(by);
         if Self::has(Services::GUARDING) {
             self.guarding.shift(by);
@@ -172,17 +178,17 @@ impl<D: Definition> Inner<D> {
         little_endian(field.get(self.image.as_ref()))
     }
 
-    /// Changes the NMT state.
+    /// Changes the NMT state. Initialising has no heartbeat, and no boot-up message before [`Device::start`](super::Device).
     #[inline(never)]
     pub(super) fn enter(&mut self, state: State) {
+        if state == State::Initialising {
+            self.heartbeat = heartbeat::Producer::new();
+        }
         if state == self.state {
             return;
         }
         let had_services = self.state.has_services();
         (self.state, self.services_due) = (state, STALE);
-        if state == State::Initialising {
-            self.heartbeat = heartbeat::Producer::new();
-        }
         if Self::has(Services::SYNC_PRODUCER) && had_services != state.has_services() {
             self.restart_sync();
         }
@@ -283,6 +289,9 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::GUARDING) && self.guarding.expire(context.now) {
             self.raise(Fault::LifeGuard, context.now);
         }
+        if Self::has(Services::FAULTS) && context.now >= self.quiet_at {
+            self.end_events(context.now);
+        }
         if Self::has(Services::EMCY) && self.state.has_services() {
             self.emcy.poll(D::Application::LISTS_DETAIL, context);
         }
@@ -295,7 +304,8 @@ impl<D: Definition> Inner<D> {
     pub(super) fn errors_due(&self) -> Tick {
         let is_sent = Self::has(Services::EMCY) && self.state.has_services();
         let emcy = if is_sent { self.emcy.due() } else { Tick::NEVER };
-        let due = if Self::has(Services::GUARDING) { emcy.min(self.guarding.due()) } else { emcy };
+        let due = if Self::has(Services::FAULTS) { emcy.min(self.quiet_at) } else { emcy };
+        let due = if Self::has(Services::GUARDING) { due.min(self.guarding.due()) } else { due };
         if Self::has(Services::HEARTBEAT_CONSUMER) { due.min(self.watches.due()) } else { due }
     }
 }

@@ -60,8 +60,9 @@ impl LssSlave {
         self.slave.is_selected()
     }
 
-    /// A reset of the device.
+    /// A reset of the device. A response that still waits is discarded, as all waiting frames are.
     pub(super) fn restart(&mut self) {
+        self.reply_due = Tick::NEVER;
         self.slave.reset();
     }
 
@@ -83,6 +84,8 @@ impl LssSlave {
         inner: &mut Inner<impl Definition>,
     ) {
         let Some(request) = frame.full(REQUEST).copied() else { return };
+        // A response that still waits is obsolete: the master has sent its next request.
+        self.reply_due = Tick::NEVER;
         let identity = |part| inner.number(IDENTITY, part + 1);
         let response = match self.slave.take(request, identity, inner.node_id) {
             Outcome::Silence => None,
@@ -106,7 +109,7 @@ impl LssSlave {
         inner.services_due = STALE;
     }
 
-    /// Sends a response, given as command specifier and value. It replaces a response that still waits: the master no longer expects the older one.
+    /// Sends a response, given as command specifier and value.
     pub(super) fn respond(&mut self, (command, value): (u8, u32), context: &mut Context<'_, impl Transmit>) {
         self.reply = frame_of_word(command, value);
         self.send(context);

@@ -98,9 +98,9 @@ impl<D: Definition> Device<D> {
         self.services.set_bit_rate(bit_rate);
     }
 
-    /// Reports the bit rate at which the bus runs. PDOs take at most three quarters of it, so that the heartbeat, EMCY and
-    /// SDO always have room. [`with_bit_rate`](Device::with_bit_rate) and a change by LSS set it too; a caller that detects
-    /// the bit rate sets it here.
+    /// Sets the present bit rate of the bus. PDOs take at most three quarters of the bus, so that the heartbeat, EMCY and SDO
+    /// always have room. [`with_bit_rate`](Device::with_bit_rate) and a change by LSS set the bit rate too; a caller that
+    /// detects the bit rate sets it here.
     pub fn set_bus_bit_rate(&mut self, bit_rate: BitRate) {
         self.services.set_bus_bit_rate(bit_rate);
     }

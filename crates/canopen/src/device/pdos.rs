@@ -66,7 +66,7 @@ impl<D: Definition> Inner<D> {
         self.restart_scanner();
     }
 
-    /// Gives the multiplexed TPDO its settings and its objects anew.
+    /// Reads the settings and the objects of the multiplexed TPDO from the dictionary.
     pub(super) fn restart_scanner(&mut self) {
         if Self::has(Services::MULTIPLEXED_TPDO) {
             self.configure_scanner(None);

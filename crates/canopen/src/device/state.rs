@@ -7,7 +7,7 @@ use super::{Action, Application, Device, Next, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::nmt::{Command, State};
 use crate::pdo::ProcessContext;
-use crate::{Instant, NodeId, Transmit, heartbeat};
+use crate::{Instant, NodeId, Transmit};
 
 /// 1F80h: the only supported value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
@@ -136,7 +136,6 @@ impl<D: Definition> Device<D> {
         let inner = &mut self.inner;
         inner.pending.started();
         let node_id = inner.node_id;
-        inner.heartbeat = heartbeat::Producer::new();
         if node_id.is_some() {
             inner.configure(now);
             inner.heartbeat.boot_up(low_half(inner.number(0x1017, 0)), now);

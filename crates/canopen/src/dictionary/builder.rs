@@ -4,6 +4,7 @@
 
 use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::{Attributes, Kind, Limits};
+use super::fail::require;
 use super::tables::{Place, Series};
 use super::{Counts, DefaultValue, Group, Object, Rule, check, image_size};
 
@@ -12,9 +13,10 @@ use super::{Counts, DefaultValue, Group, Object, Rule, check, image_size};
 #[derive(Debug)]
 pub struct TableBuilder {
     pub(super) series: [Series; MAX],
-    pub(super) places: [Place; MAX],
-    pub(super) attributes: [Attributes; MAX_ATTRIBUTES],
-    pub(super) defaults: [u8; MAX_DEFAULTS],
+    // With room for an object, a row and a series that are equal to stored ones.
+    pub(super) places: [Place; MAX + 255],
+    pub(super) attributes: [Attributes; MAX_ATTRIBUTES + 1],
+    pub(super) defaults: [u8; 2 * MAX_DEFAULTS],
     /// The end of the series of each dictionary.
     pub(super) ends: [u16; MAX_DICTIONARIES],
     pub(super) used: Counts,
@@ -47,8 +49,12 @@ impl TableBuilder {
     }
 
     /// The tables of these tables of rows, which must be right.
+    ///
+    /// # Panics
+    /// During compilation, when the tables are too large.
     #[must_use]
     pub const fn of(all: &[&[Object]]) -> TableBuilder {
+        assert!(all.len() <= MAX_DICTIONARIES, "more than 64 dictionaries are compiled together");
         let (mut builder, mut i) = (TableBuilder::new(&all[0][0]), 0);
         while i < all.len() {
             builder.add(all[i]);
@@ -76,9 +82,9 @@ impl TableBuilder {
                 objects: 0,
                 entries: 0,
             }; MAX],
-            places: [Place { sub: 0, attributes: 0, offset: 0 }; MAX],
-            attributes: [attributes(any); MAX_ATTRIBUTES],
-            defaults: [0; MAX_DEFAULTS],
+            places: [Place { sub: 0, attributes: 0, offset: 0 }; MAX + 255],
+            attributes: [attributes(any); MAX_ATTRIBUTES + 1],
+            defaults: [0; 2 * MAX_DEFAULTS],
             ends: [0; MAX_DICTIONARIES],
             used: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
         }
@@ -98,6 +104,12 @@ impl TableBuilder {
     /// Adds a series. `rows` are the rows of its objects, `entries` the number of rows per object, `offset` the offset
     /// of the first object in the image. `all` is the whole table, for the event timers that other entries refer to.
     const fn add_series(&mut self, all: &[Object], rows: &[Object], entries: usize, offset: u16) {
+        let head = &rows[0];
+        require!(
+            self.used.series < MAX,
+            head,
+            "the tables have more than 1024 series of objects that differ in their index only",
+        );
         let defaults_len = self.write_defaults(rows);
         self.series[self.used.series] = Series {
             index: rows[0].index,
@@ -109,6 +121,11 @@ impl TableBuilder {
             entries: entries as u8,
         };
         self.used.series += 1;
+        require!(
+            self.used.defaults <= MAX_DEFAULTS,
+            head,
+            "the default values of the tables take more than 65536 bytes",
+        );
     }
 
     /// Adds the places of an object. Returns the number of the first one, which may be an equal sequence already
@@ -116,7 +133,12 @@ impl TableBuilder {
     const fn add_places(&mut self, all: &[Object], object: &[Object], start_of_object: u16) -> usize {
         let (start, mut row, mut next) = (self.used.places, 0, 0);
         while row < object.len() {
-            let attributes = self.add_attributes(attributes(&object[row])) as u8;
+            let number = self.add_attributes(attributes(&object[row]));
+            require!(
+                number < MAX_ATTRIBUTES,
+                &object[row],
+                "the entries have more than 256 combinations of type, access, limits and other attributes",
+            );
             let offset = match object[row].rule {
                 Rule::EventTimerOf(number) => {
                     let timer = image_size(all.split_at(event_timer(all, number)).0);
@@ -124,7 +146,7 @@ impl TableBuilder {
                 }
                 _ => next,
             };
-            self.places[start + row] = Place { sub: object[row].sub, attributes, offset };
+            self.places[start + row] = Place { sub: object[row].sub, attributes: number as u8, offset };
             (row, next) = (row + 1, next + object[row].stored_size() as u16);
         }
         let (mut first, head) = (0, self.places[start]);
@@ -134,6 +156,11 @@ impl TableBuilder {
             first += 1;
         }
         self.used.places = larger(start, first + object.len());
+        require!(
+            self.used.places <= MAX,
+            &object[0],
+            "the objects have more than 1024 entries, those of equal objects counted once",
+        );
         first
     }
 
@@ -227,8 +254,7 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.limits.is_same(b.limits)
 }
 
-/// Whether two rows have the same attributes. Rows of a series are equal as they are written; only then is nothing
-/// computed.
+/// Whether two rows have the same attributes. Equal rows, as in a series, need no computation.
 pub(super) const fn is_alike(a: &Object, b: &Object) -> bool {
     let same_limits = match (a.limits, b.limits) {
         (None, None) => true,

@@ -3,7 +3,7 @@
 use super::check_pdos::{check_pdo_row, of_first_and_last};
 use super::compile::{effective_limits, find};
 use super::fail::{fail, require};
-use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
+use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type};
 use crate::sdo::BUFFER;
 
 /// Checks a table: the rows are sorted, no entry occurs twice, every default has the type of its entry and is within
@@ -14,10 +14,11 @@ use crate::sdo::BUFFER;
 /// During compilation, when a row is wrong. The message begins with index and sub-index of the row.
 #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 pub const fn check(rows: &[Object]) {
-    assert!(image_size(rows) <= u16::MAX as usize, "the values of the table take more than 65535 bytes");
-    let mut i = 0;
+    let (mut i, mut size) = (0, 0);
     while i < rows.len() {
         let row = &rows[i];
+        size += row.stored_size();
+        require!(size <= u16::MAX as usize, row, "the values of the table take more than 65535 bytes");
         if i > 0 {
             require!(rows[i - 1].key() != row.key(), row, "the row is there twice");
             require!(rows[i - 1].key() < row.key(), row, "the rows are not sorted by index and sub-index");
@@ -67,6 +68,7 @@ const fn check_group(rows: &[Object], row: &Object) {
 
 const fn check_row(row: &Object) {
     require!(row.sub < u8::MAX, row, "an object has at most 255 entries, 0 to 254");
+    require!(row.index != 0x1016 || row.sub <= 127, row, "at most 127 heartbeats are monitored");
     require!(row.index != 0x1028 || row.sub <= 127, row, "the sub-index is a node-ID, 1 to 127");
     check_rule(row);
     check_limits(row);

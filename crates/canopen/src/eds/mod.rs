@@ -256,7 +256,7 @@ impl Display for EntryName<'_> {
     }
 }
 
-/// The default of a row. An empty text is none: the application fills it in.
+/// The default of a row. An empty text has no default in the EDS: the application writes the text.
 struct Default<'a>(&'a Object, Reals);
 
 impl Default<'_> {

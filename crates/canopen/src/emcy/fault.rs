@@ -7,7 +7,7 @@ use crate::dictionary::Group;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
-    /// A received frame was lost (8110h).
+    /// Received frames were lost (8110h). The fault ends when none was lost for half a second.
     Overrun,
     /// The CAN controller is error passive (8120h).
     ErrorPassive,
@@ -17,7 +17,8 @@ pub enum Fault {
     SyncMissing,
     /// A SYNC had another length than 1019h requires (8240h).
     SyncLength,
-    /// A multiplexed PDO for this node names an object that does not accept it (8230h).
+    /// A multiplexed PDO for this node names an object that does not accept it (8230h). The fault ends half a second after
+    /// the last one.
     MpdoNotTaken,
     /// The heartbeat of a node is missing (8130h). The number is the entry of 1016h, from 0.
     Heartbeat(u8),

@@ -243,7 +243,7 @@ mod tests {
     /// Foreign frames leave 40 per cent of the bus, in which a frame takes two and a half times as long. Eight PDOs are due
     /// at every millisecond.
     #[test]
-    fn on_a_bus_that_others_hold_gaps_are_left() {
+    fn on_a_busy_bus_gaps_are_left() {
         for kbit in RATES {
             let (mut budget, mut free_at, mut waiting) = (Budget::new(kbit), 0, 0);
             let span = 135_000 * 5 / 2 / u32::from(kbit);

@@ -67,7 +67,7 @@ fn more_segments_than_announced_are_against_the_protocol() {
 }
 
 #[test]
-fn blocks_that_are_never_in_sequence_come_to_an_end() {
+fn an_upload_with_wrong_sequence_numbers_ends() {
     for number in [2, 5, 127] {
         let segment =
             BlockSegment { last: number != 127, sequence: BlockSize::new(number).unwrap(), data: [0; 7] };
@@ -88,7 +88,7 @@ fn blocks_that_are_never_in_sequence_come_to_an_end() {
 }
 
 #[test]
-fn blocks_that_never_arrive_come_to_an_end() {
+fn a_download_without_an_acknowledged_segment_ends() {
     let mut device = |request: [u8; 8]| match request[0] {
         0xC6 => vec![Response::BlockDownload(OBJECT, BlockSize::new(1).unwrap()).encode()],
         _ => vec![Response::BlockAcknowledge(0, BlockSize::new(1).unwrap()).encode()],

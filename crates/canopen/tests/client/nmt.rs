@@ -21,7 +21,7 @@ fn heartbeat(node: u16, state: u8) -> Frame {
 }
 
 #[test]
-fn each_command_has_the_state_that_shows_its_effect() {
+fn each_command_has_the_state_of_its_effect() {
     for (command, state) in [
         (Command::Start, State::Operational),
         (Command::Stop, State::Stopped),

@@ -81,7 +81,7 @@ impl Device for Faulty {
 }
 
 #[test]
-fn an_answer_that_is_lost_or_doubled_does_no_harm() {
+fn a_lost_or_doubled_answer_does_no_harm() {
     let data = value(100);
     for copies in [0, 2] {
         for at in 0..20 {
@@ -150,7 +150,7 @@ fn a_late_abort_message_is_passed_over() {
 
 /// A server without block transfers may name the object of the previous transfer.
 #[test]
-fn a_request_that_is_not_understood_is_refused_whatever_object_is_named() {
+fn an_unknown_request_is_refused_with_any_object_in_the_answer() {
     let mut simple = |_: [u8; 8]| {
         let before = canopen::sdo::Multiplexer { index: 0x1F56, sub: 1 };
         vec![Response::Abort(before, Abort::Command.code()).encode()]
@@ -172,7 +172,7 @@ fn silence_takes_the_time_outs_and_aborts_at_the_server() {
 }
 
 #[test]
-fn a_value_that_is_too_long_for_its_place_is_refused() {
+fn a_value_longer_than_its_place_is_refused() {
     for is_sizeless in [false, true] {
         let mut server = Server { is_sizeless, ..Server::new(&value(5000)) };
         assert_eq!(upload(&mut server, once()).0, Err(Error::TooLong));
@@ -181,7 +181,7 @@ fn a_value_that_is_too_long_for_its_place_is_refused() {
 }
 
 #[test]
-fn data_that_was_changed_on_the_way_is_a_crc_error() {
+fn changed_data_is_a_crc_error() {
     let mut server = Server::new(&value(100));
     let mut changed = |request: [u8; 8]| {
         let mut answers = server.answer(request);

@@ -386,7 +386,7 @@ fn a_request_after_a_reset_within_a_block_is_answered() {
 }
 
 #[test]
-fn a_client_that_gives_up_or_falls_silent_ends_the_transfer() {
+fn an_abort_or_a_silent_client_ends_the_transfer() {
     let mut client = Client::new();
     client.bench.device.application_mut().domain = data(2000);
     for silence in [false, true] {
@@ -434,7 +434,7 @@ fn a_block_leaves_room_in_the_queue() {
 
 /// A client that gets no segment gives up.
 #[test]
-fn a_block_that_the_queue_never_takes_ends_with_the_time_out() {
+fn a_block_in_a_full_queue_ends_with_the_time_out() {
     let mut client = uploading(10);
     client.bench.take();
     let mut responses = |ms| {
@@ -464,7 +464,7 @@ fn a_pause_within_any_block_is_answered() {
 
 /// A segment that arrives twice in a row counts once. A segment that arrives again later is the missing one.
 #[test]
-fn a_segment_that_came_too_early_is_taken_when_its_turn_has_come() {
+fn an_early_segment_is_taken_in_its_turn() {
     let mut client = Client::new();
     let content = data(35);
     client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(35) });
@@ -480,7 +480,7 @@ fn a_segment_that_came_too_early_is_taken_when_its_turn_has_come() {
 }
 
 #[test]
-fn the_begin_of_a_download_that_comes_twice_is_no_segment() {
+fn a_repeated_begin_of_a_download_is_no_segment() {
     let mut client = Client::new();
     let request = Request::BlockDownload { at: DOMAIN, crc: true, size: Some(7) };
     let ready = client.bench.ask(request);
@@ -532,7 +532,7 @@ proptest! {
 }
 
 #[test]
-fn a_block_that_finds_the_queue_full_continues_after_one_millisecond() {
+fn a_block_continues_one_millisecond_after_a_full_queue() {
     let mut client = uploading(30);
     client.bench.out.room = 1000;
     let id = 0x580 + u16::from(crate::bench::ID);

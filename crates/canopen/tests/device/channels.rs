@@ -177,7 +177,7 @@ fn a_block_goes_through_a_further_server() {
 }
 
 #[test]
-fn every_client_that_waits_for_a_job_gets_its_answer() {
+fn every_client_of_a_job_gets_its_answer() {
     let mut node = with_two_channels();
     let mut out = Sent::default();
     while node.poll(Instant(1), &mut out).action.is_some() {}
@@ -197,7 +197,7 @@ fn every_client_that_waits_for_a_job_gets_its_answer() {
 }
 
 #[test]
-fn a_channel_that_is_disabled_forgets_its_transfer() {
+fn a_disabled_channel_forgets_its_transfer() {
     let mut node = with_two_channels();
     Reading::begin(&mut node, SECOND);
     assert_eq!(write(&mut node, (0x1201, 1), &(0x8000_0000 | u32::from(SECOND.0)).to_le_bytes()), Ok(()));

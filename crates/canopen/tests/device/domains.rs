@@ -195,7 +195,7 @@ fn an_upload_in_blocks_reads_each_part_once() {
 
 /// A lost segment is sent again, and the CRC, which the client checks, counts it once.
 #[test]
-fn a_block_that_is_sent_again_is_read_again() {
+fn a_repeated_block_is_read_again() {
     for lost in [1, 2, 17, 18, 100, 127, 128, 200] {
         let mut node = node(3000);
         assert_eq!(block_upload(&mut node, |number| number == lost), Ok(content(3000)), "answer {lost}");
@@ -214,7 +214,7 @@ fn a_domain_without_a_length_is_one_slice() {
 }
 
 #[test]
-fn a_part_that_cannot_be_read_aborts_the_upload() {
+fn an_unreadable_part_aborts_the_upload() {
     for (len, broken) in [(3, 1), (200, 0), (200, 150)] {
         let mut node = node(len);
         node.application_mut().broken = Some(broken);
@@ -298,7 +298,7 @@ fn every_end_of_a_download_is_reported_once() {
 }
 
 #[test]
-fn a_download_that_is_complete_has_no_abort() {
+fn a_complete_download_has_no_abort() {
     let id = NodeId::new(ID).unwrap();
     for len in LENGTHS {
         let (mut node, data) = (node(0), content(len));
@@ -310,7 +310,7 @@ fn a_download_that_is_complete_has_no_abort() {
 }
 
 #[test]
-fn a_download_that_the_application_refuses_is_aborted() {
+fn a_download_refused_by_the_application_is_aborted() {
     let id = NodeId::new(ID).unwrap();
     for len in [3, 50, 200] {
         let (mut node, data) = (node(0), content(len));

@@ -73,7 +73,7 @@ fn messages_wait_for_room_in_order_and_the_oldest_are_kept() {
 }
 
 #[test]
-fn a_fault_that_is_still_there_after_a_reset_is_news_again() {
+fn an_active_fault_is_reported_again_after_a_reset() {
     let mut bench = Bench::booted();
     bench.raise(SENSOR_BREAK);
     bench.raise(PRESSURE_RAIL);
@@ -118,7 +118,7 @@ fn listed(bench: &mut Bench) -> Vec<u16> {
 }
 
 #[test]
-fn the_list_has_no_error_that_was_not_sent() {
+fn an_unsent_error_is_not_listed() {
     let mut bench = Bench::booted();
     bench.write32(0x1014, 0, 0x8000_0085).unwrap();
     bench.raise(SENSOR_BREAK);
@@ -137,7 +137,7 @@ fn the_list_has_no_error_that_was_not_sent() {
 }
 
 #[test]
-fn emcy_that_is_switched_on_reports_the_faults_that_are_present() {
+fn enabling_1014h_reports_the_active_faults() {
     let mut bench = Bench::booted();
     bench.write32(0x1014, 0, 0x8000_0085).unwrap();
     bench.write32(0x1600, 1, 0x6200_0010).unwrap();
@@ -161,7 +161,7 @@ fn emcy_that_is_switched_on_reports_the_faults_that_are_present() {
 }
 
 #[test]
-fn a_shorter_inhibit_time_releases_a_message_that_waits() {
+fn a_shorter_inhibit_time_releases_a_waiting_message() {
     for (inhibit, expected) in [(0_u16, vec![0]), (2000, vec![100_000])] {
         let mut bench = Bench::booted();
         bench.write(0x1015, 0, &10_000_u16.to_le_bytes()).unwrap();
@@ -189,4 +189,48 @@ fn the_inhibit_time_separates_messages() {
     assert_eq!(bench.times_of(0x085, Duration::from_millis(30)), [0]);
     bench.bus(BusEvent::Overrun);
     assert_eq!(bench.times_of(0x085, Duration::from_millis(30)), [0]);
+}
+
+/// The error codes of the EMCYs since the last call.
+fn codes(bench: &mut Bench) -> Vec<u16> {
+    let emcys = bench.sent().into_iter().filter(|(id, _)| *id == 0x085);
+    emcys.map(|(_, data)| u16::from_le_bytes([data[0], data[1]])).collect()
+}
+
+/// Two EMCYs for each lost frame would fill the bus that has already too many frames, and the list of errors.
+#[test]
+fn lost_frames_are_one_fault_until_a_quiet_half_second() {
+    let mut bench = Bench::booted();
+    for _ in 0..1000 {
+        bench.bus(BusEvent::Overrun);
+        bench.run(Duration::from_millis(1));
+    }
+    assert_eq!(codes(&mut bench), [0x8110]);
+    assert_eq!(bench.read(0x1001, 0), Ok(vec![0x11]));
+    bench.run(Duration(498_999));
+    assert_eq!(codes(&mut bench), []);
+    bench.run(Duration(1));
+    assert_eq!(codes(&mut bench), [0]);
+    assert_eq!((bench.read(0x1001, 0), bench.read(0x1003, 0)), (Ok(vec![0]), Ok(vec![1])));
+    bench.bus(BusEvent::Overrun);
+    assert_eq!(codes(&mut bench), [0x8110]);
+}
+
+#[test]
+fn the_quiet_time_of_lost_frames_ends_in_every_nmt_state() {
+    for command in [1, 2, 0x80] {
+        let mut bench = Bench::booted();
+        bench.bus(BusEvent::Overrun);
+        bench.nmt(command);
+        bench.run(Duration::from_millis(500));
+        bench.nmt(0x80);
+        assert_eq!(codes(&mut bench), [0x8110, 0], "command {command:02X}h");
+    }
+    let mut bench = Bench::booted();
+    bench.bus(BusEvent::Overrun);
+    bench.nmt(0x82);
+    bench.run(Duration::from_millis(1000));
+    bench.start();
+    bench.run(Duration::from_millis(1));
+    assert_eq!(codes(&mut bench), [0x8110, 0x8110, 0], "the reset reports the active faults again");
 }

@@ -70,7 +70,7 @@ fn an_emcy_has_the_error_field_of_the_moment_after_a_reset_too() {
 }
 
 #[test]
-fn the_number_of_errors_is_at_most_that_of_the_entries_of_1003h() {
+fn the_list_has_no_more_errors_than_1003h_has_entries() {
     let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Channels { channel: 3, value: 0x1234 });
     let _ = node.start(Instant(0), &mut Sent::default());
     for at in 1..=6 {

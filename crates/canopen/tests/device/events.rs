@@ -75,7 +75,7 @@ fn the_inhibit_time_delays_events_and_loses_none() {
 }
 
 #[test]
-fn the_event_timer_sends_all_that_waits_or_the_last_one_again() {
+fn the_event_timer_sends_all_waiting_events_or_the_last_one_again() {
     for transmission in [254, 255] {
         let mut bench = operational(transmission, 0, 500);
         bench.run(Duration::from_millis(100));

@@ -82,7 +82,7 @@ fn a_device_with_a_heartbeat_is_not_guarded() {
 }
 
 #[test]
-fn a_missing_master_is_an_error_until_it_returns() {
+fn a_missing_master_is_an_error_until_the_next_remote_frame() {
     let mut node = node();
     write(&mut node, (0x100C, 0), &[100, 0]);
     write(&mut node, (0x100D, 0), &[3]);

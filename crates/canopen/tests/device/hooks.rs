@@ -37,7 +37,7 @@ fn nmt_states_are_reported_once_each() {
 }
 
 #[test]
-fn an_sdo_write_is_reported_after_it_is_stored() {
+fn an_sdo_write_is_reported_after_the_value_is_stored() {
     let mut bench = Bench::booted();
     bench.told();
     bench.write(0x6100, 0, &[3, 0]).unwrap();

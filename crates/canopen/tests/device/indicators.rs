@@ -73,6 +73,15 @@ fn error_shows_the_worst_of_several_errors() {
 }
 
 #[test]
+fn damaged_stored_values_blink_unless_the_bus_has_an_error() {
+    let mut bench = Bench::unstarted();
+    bench.device.application_mut().is_damaged = true;
+    bench.start();
+    assert_eq!(patterns(&bench, Good).1, Blinking);
+    assert_eq!(patterns(&bench, Warning).1, Flashes(1));
+}
+
+#[test]
 fn the_end_of_the_time_has_no_next_change() {
     assert_eq!(Indicators::next_change(Instant::NEVER), Instant::NEVER);
     let both = Indicators { run: Pattern::Flickering, error: Pattern::Flickering };

@@ -1,7 +1,7 @@
 //! Times beyond 32 bits of microseconds: no deadline of a device is early, late or in the past.
 
 use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
-use canopen::{Application, Device, Fault, Frame, Instant, NodeId, objects};
+use canopen::{Application, BusEvent, Device, Fault, Frame, Instant, NodeId, objects};
 
 use crate::exchange;
 use crate::types::Sent;
@@ -98,4 +98,16 @@ fn the_longest_life_time_ends_after_four_and_a_half_hours() {
     assert_eq!(node.application().0, 0, "the life time is not over");
     let _ = node.poll(Instant(end), &mut Sent::default());
     assert_eq!(node.application().0, 1);
+}
+
+/// The longest time of a device is 71 minutes. A check for the last of them would cost flash in every call.
+#[test]
+fn until_71_minutes_before_the_end_of_64_bits_no_deadline_is_in_the_past() {
+    let (start, end) = (u64::MAX - 3 * HOUR, u64::MAX - u64::from(u32::MAX));
+    let mut node = operational(start);
+    let _ = node.on_frame(&Frame::remote(0x705, 1).unwrap(), Instant(start), &mut Sent::default());
+    let _ = node.set_condition(0, true, Instant(start));
+    let _ = node.on_bus(BusEvent::Overrun, Instant(start));
+    let heartbeats = times(&mut node, (start, end), 0x705);
+    assert!(heartbeats.windows(2).all(|pair| pair[1] - pair[0] == SECOND));
 }

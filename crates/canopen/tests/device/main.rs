@@ -12,6 +12,7 @@ mod emergencies;
 mod events;
 #[path = "../exchange/mod.rs"]
 mod exchange;
+mod full_bus;
 mod guarding;
 mod heartbeat;
 mod hooks;

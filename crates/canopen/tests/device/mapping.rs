@@ -125,7 +125,7 @@ proptest! {
     /// After any writes in any order, a TPDO that exists has a mapping of one to eight bytes that agrees with the
     /// entries read back, and an identifier that is allowed for PDOs.
     #[test]
-    fn no_sequence_of_writes_makes_a_pdo_that_cannot_be(sequence in prop::collection::vec(writes(), 1..40)) {
+    fn no_sequence_of_writes_makes_an_invalid_pdo(sequence in prop::collection::vec(writes(), 1..40)) {
         let mut bench = Bench::operational();
         for (index, sub, bytes) in sequence {
             let before = bench.read(index, sub).unwrap();

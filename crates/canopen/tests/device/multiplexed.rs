@@ -45,7 +45,7 @@ fn errors(bench: &mut Bench) -> Vec<u16> {
 }
 
 #[test]
-fn in_destination_mode_all_that_no_tpdo_carries_is_sent_to_all_nodes() {
+fn in_destination_mode_objects_outside_tpdos_are_sent_to_all_nodes() {
     let mut bench = sender(DESTINATION);
     bench.nmt(1);
     let first = mpdos(&mut bench);
@@ -111,7 +111,7 @@ fn a_full_queue_delays_and_leaving_operational_drops() {
 }
 
 #[test]
-fn one_that_is_mapped_elsewhere_is_not_sent_twice() {
+fn an_object_of_another_tpdo_is_not_sent_twice() {
     let mut bench = Bench::operational();
     // TPDO 1 carries 6000h:1. No second TPDO is multiplexed, so nothing is sent with this CAN-ID.
     bench.set_value(2, &[1, 0]);
@@ -177,7 +177,7 @@ fn the_rpdo_for_all_nodes_takes_no_other_function_code_and_no_other_pdo() {
 }
 
 #[test]
-fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
+fn a_missing_object_is_an_error_for_the_addressed_node_only() {
     for (address, expected) in [(0x80 | ID, vec![0x8230]), (0x80, vec![])] {
         for object in [[0x00, 0x70, 0], [0x00, 0x62, 1], [0x00, 0x60, 1], [0x17, 0x10, 0]] {
             let mut bench = receiver(DESTINATION);
@@ -188,9 +188,22 @@ fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
     }
 }
 
+#[test]
+fn rejected_multiplexed_pdos_are_one_fault_until_a_quiet_half_second() {
+    let mut bench = receiver(DESTINATION);
+    for _ in 0..100 {
+        bench.receive(Frame::new(RPDO, &[0x80 | ID, 0x00, 0x70, 0, 1, 2, 3, 4]).unwrap());
+        bench.run(Duration::from_millis(10));
+    }
+    let emcys = |bench: &mut Bench| bench.take().iter().filter(|frame| frame.id() == 0x085).count();
+    assert_eq!(emcys(&mut bench), 1);
+    bench.run(Duration::from_millis(490));
+    assert_eq!(emcys(&mut bench), 1, "the end");
+}
+
 /// 6203h accepts -5 to 5, and the application rejects 13 at 6201h.
 #[test]
-fn a_value_that_the_object_rejects_is_an_error_for_the_node_that_is_addressed() {
+fn a_rejected_value_is_an_error_for_the_addressed_node() {
     for (object, value) in [([0x03, 0x62, 0], 6), ([0x01, 0x62, 0], 13)] {
         for (address, expected) in [(0x80 | ID, vec![0x8230]), (0x80, vec![])] {
             let mut bench = receiver(DESTINATION);
@@ -301,7 +314,7 @@ fn reconfiguration_does_not_shorten_the_inhibit_time() {
 }
 
 #[test]
-fn the_application_learns_of_a_value_that_is_taken() {
+fn the_application_learns_of_an_accepted_value() {
     let mut bench = receiver(DESTINATION);
     bench.told();
     for (object, is_taken) in [(0x6200_u16, true), (0x6000, false)] {

@@ -130,7 +130,7 @@ fn start_up_takes_pre_operational_and_self_start_only() {
 }
 
 #[test]
-fn a_node_that_starts_by_itself_boots_up_first_and_waits_for_values() {
+fn a_self_starting_node_boots_up_first_and_waits_for_values() {
     let mut bench = Bench::unstarted();
     bench.device.application_mut().start_up = 8;
     bench.start();
@@ -142,7 +142,7 @@ fn a_node_that_starts_by_itself_boots_up_first_and_waits_for_values() {
 }
 
 #[test]
-fn a_master_that_was_faster_has_the_last_word() {
+fn an_earlier_command_of_the_master_cancels_the_self_start() {
     for (command, state) in [(STOP, State::Stopped), (PRE_OPERATIONAL, State::PreOperational)] {
         let mut bench = Bench::unstarted();
         bench.device.application_mut().start_up = 8;
@@ -228,7 +228,7 @@ fn the_emcy_of_an_error_is_sent_before_the_state_changes() {
 }
 
 #[test]
-fn a_node_that_has_to_stop_is_pre_operational_until_its_emcys_are_sent() {
+fn a_stopping_node_is_pre_operational_until_its_emcys_are_sent() {
     let mut bench = watching(2);
     bench.write(0x1017, 0, &[0, 0]).unwrap();
     bench.write(0x1015, 0, &50_u16.to_le_bytes()).unwrap();
@@ -369,7 +369,7 @@ fn a_load_keeps_the_scope_of_the_reset() {
 }
 
 #[test]
-fn a_load_keeps_the_actions_that_wait() {
+fn a_load_keeps_the_waiting_actions() {
     let mut bench = Bench::booted();
     while bench.take_action().is_some() {}
     let reset = Frame::new(0, &[0x81, ID]).unwrap();
@@ -388,7 +388,7 @@ fn a_load_uses_the_node_id_of_the_next_start() {
 
 /// The reset is handed over first, and the caller starts the device at once.
 #[test]
-fn a_start_keeps_the_change_of_the_bit_rate_that_is_due() {
+fn a_start_keeps_the_due_change_of_the_bit_rate() {
     let mut bench = Bench::booted();
     while bench.take_action().is_some() {}
     for request in [
@@ -410,7 +410,7 @@ fn a_start_keeps_the_change_of_the_bit_rate_that_is_due() {
 
 /// The end of a job comes before the next poll.
 #[test]
-fn an_error_that_stops_the_device_ends_its_transfers() {
+fn an_error_with_stopped_in_1029h_ends_the_transfers() {
     let mut bench = Bench::operational();
     bench.write(0x1029, 1, &[2]).unwrap();
     bench.bus(BusEvent::Recovered);
@@ -420,4 +420,16 @@ fn an_error_that_stops_the_device_ends_its_transfers() {
     assert_eq!(bench.device.state(), State::Stopped);
     let _ = bench.device.finish(Ok(()), bench.now, &mut bench.out);
     assert!(bench.take().iter().all(|frame| frame.id() != 0x585));
+}
+
+#[test]
+fn a_start_without_a_node_id_forgets_the_boot_up_message() {
+    let mut bench = Bench::unstarted();
+    bench.out.room = 0;
+    bench.start();
+    bench.device.set_node_id(None);
+    bench.start();
+    bench.out.room = 10;
+    bench.run(Duration::from_millis(5000));
+    assert_eq!(bench.sent(), []);
 }

@@ -110,7 +110,7 @@ fn a_counter_begins_with_1_after_stopped() {
 }
 
 #[test]
-fn a_write_that_changes_no_setting_of_the_producer_leaves_its_period_alone() {
+fn an_equal_write_leaves_the_period_of_the_producer_alone() {
     for (index, value) in [(0x1007, 5000_u32), (0x1005, 0x4000_0080), (0x1006, 10_000)] {
         let mut node = node();
         assert_eq!(run(&mut node, (1, 5000), &[0x80]).len(), 1);

@@ -141,7 +141,7 @@ fn dummy_entries_skip_bytes() {
 }
 
 #[test]
-fn objects_that_cannot_be_received_cannot_be_mapped() {
+fn objects_without_rpdo_mapping_cannot_be_mapped() {
     let mut bench = Bench::booted();
     assert_eq!(bench.write32(0x1600, 1, 0x6000_0120), Err(0x0604_0041));
     assert_eq!(bench.write32(0x1600, 1, 0x6100_0010), Err(0x0604_0041));

@@ -170,7 +170,7 @@ fn a_silent_client_times_out() {
 }
 
 #[test]
-fn a_segment_that_comes_again_after_the_time_out_comes_too_late() {
+fn a_repeated_segment_after_the_time_out_is_too_late() {
     let mut bench = Bench::booted();
     let at = Multiplexer { index: 0x1008, sub: 0 };
     bench.ask(Request::Upload(at));

@@ -133,7 +133,7 @@ fn the_client_can_do_something_else_meanwhile() {
 }
 
 #[test]
-fn a_memory_that_never_answers_times_out() {
+fn a_silent_memory_times_out() {
     let mut bench = Bench::booted();
     begin(&mut bench, 0x1010, 1, SAVE);
     bench.run(canopen::Duration::from_millis(1100));
@@ -230,7 +230,7 @@ fn values_of_an_older_dictionary_fit_and_new_objects_have_their_defaults() {
 }
 
 #[test]
-fn values_that_no_longer_fit_are_refused_as_a_whole_and_reported() {
+fn unfitting_stored_values_are_refused_as_a_whole_and_reported() {
     let good = [0x17, 0x10, 0, 1, 2, 0xF4, 0x01];
     let misfits: &[&[u8]] = &[
         &[0x18, 0x20, 0, 1, 2, 0, 0],             // no such object
@@ -264,7 +264,7 @@ fn values_that_no_longer_fit_are_refused_as_a_whole_and_reported() {
 }
 
 #[test]
-fn a_memory_that_fell_back_to_older_values_is_reported() {
+fn a_memory_with_older_values_is_reported() {
     let mut bench = Bench::booted();
     bench.device.application_mut().is_damaged = true;
     bench.nmt(RESET_NODE);

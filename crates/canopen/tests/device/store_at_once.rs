@@ -187,7 +187,7 @@ fn a_refused_preset_is_not_stored() {
 
 /// The setting has a job of its own.
 #[test]
-fn a_setting_that_the_application_would_store_too_begins_one_job() {
+fn a_setting_begins_one_job_although_the_application_stores_the_entry_too() {
     let mut bench = booted();
     bench.device.application_mut().stored_at_once = 0x5F00;
     request(&mut bench, [0x2F, 0, 0x5F, 0, 2, 0, 0, 0]);

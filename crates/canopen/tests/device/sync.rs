@@ -111,7 +111,7 @@ fn the_start_value_is_fixed_while_the_pdo_is_valid() {
 }
 
 #[test]
-fn a_missing_sync_is_signalled_until_it_returns() {
+fn a_missing_sync_is_signalled_until_the_next_sync() {
     let mut bench = bench(1, 0, false);
     bench.write32(0x1006, 0, 10_000).unwrap();
     bench.run(Duration::from_millis(100));
@@ -150,9 +150,24 @@ fn after_the_window_a_synchronous_pdo_is_dropped() {
     }
 }
 
+#[test]
+fn the_end_of_the_window_belongs_to_the_window() {
+    for (passed, sent) in [(2000, 1), (2001, 0)] {
+        let mut bench = bench(1, 0, false);
+        bench.write32(0x1007, 0, 2000).unwrap();
+        bench.take();
+        bench.out.room = 0;
+        bench.sync();
+        bench.now = bench.now + Duration(passed);
+        bench.out.room = 10;
+        bench.poll();
+        assert_eq!(bench.take().iter().filter(|frame| frame.id() == TPDO).count(), sent, "after {passed} us");
+    }
+}
+
 /// The usual sequence of a master that starts again: its SYNC is away, and the NMT state changes meanwhile.
 #[test]
-fn a_missing_sync_is_no_fault_any_more_when_it_is_back_in_another_state() {
+fn a_sync_in_another_nmt_state_ends_the_fault_of_a_missing_one() {
     for commands in [[0x80, 1], [2, 1], [1, 1]] {
         let mut bench = bench(1, 0, false);
         bench.write32(0x1006, 0, 100_000).unwrap();
@@ -162,5 +177,22 @@ fn a_missing_sync_is_no_fault_any_more_when_it_is_back_in_another_state() {
         commands.into_iter().for_each(|command| bench.nmt(command));
         bench.sync();
         assert_eq!(emergencies(&mut bench), [0], "{commands:x?}");
+    }
+}
+
+/// 1006h has 32 bits: 71 minutes, and half a period more until the SYNC is missing.
+#[test]
+fn a_long_period_is_monitored_for_one_and_a_half_periods() {
+    for period in [2_000_000_000_u32, 1 << 31, 3_000_000_000, u32::MAX - 1, u32::MAX] {
+        let mut bench = bench(1, 0, false);
+        bench.write32(0x1006, 0, period).unwrap();
+        bench.sync();
+        let end = u64::from(period) + u64::from(period / 2);
+        bench.run(Duration(end - 1));
+        assert_eq!(emergencies(&mut bench), [], "a period of {period} us");
+        bench.run(Duration(1));
+        assert_eq!(emergencies(&mut bench), [0x8100], "a period of {period} us");
+        bench.sync();
+        assert_eq!(emergencies(&mut bench), [0]);
     }
 }

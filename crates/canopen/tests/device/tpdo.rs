@@ -39,7 +39,7 @@ fn it_is_sent_on_entering_operational_and_by_its_event_timer() {
 
 /// A change every 50 us: three quarters of the bus at most, and services between the PDOs.
 #[test]
-fn a_queue_that_replaces_nothing_has_a_share_of_the_bus() {
+fn a_queue_without_replacement_has_a_share_of_the_bus() {
     for kbit in [1000, 500, 125] {
         let mut bench = bench(255, 0, 0);
         bench.device.set_bus_bit_rate(BitRate::from_kbit(kbit).unwrap());

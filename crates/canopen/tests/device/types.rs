@@ -13,12 +13,15 @@ const fn row(sub: u8, kind: Type) -> Object {
 }
 
 const WIDE: Object = row(7, Type::Real64).real64(-0.1);
+const REAL: Object =
+    Object::new(0x2100, 15, "", Type::Real32, Access::ReadWrite).real(0.0).mappable(Mapping::Rpdo);
 const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(0)],
     objects::identity(0, 1, 1),
+    objects::rpdo(1, &[REAL]),
     objects::tpdo(1, &[WIDE]),
     [
-        Object::highest(0x2100, 14, ""),
+        Object::highest(0x2100, 15, ""),
         row(1, Type::Integer24).value(-2).limits(-3, 4),
         row(2, Type::Integer40).value(-2),
         row(3, Type::Integer48).value(-2),
@@ -33,6 +36,7 @@ const ROWS: &[Object] = canopen::rows!(
         row(12, Type::OctetString(8)),
         Object::new(0x2100, 13, "", Type::OctetString(12), Access::ReadWrite),
         row(14, Type::Unsigned64).value(i64::MAX),
+        REAL,
     ],
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
@@ -115,6 +119,17 @@ fn a_real64_is_sent_by_pdo() {
     let field = DICTIONARY.field(0x2100, 7);
     let _ = node.publish(Instant(2), &mut sent, |(), image| field.set_f64(image, 1e300));
     assert_eq!(sent.0.last().map(Frame::data), Some(&1e300_f64.to_le_bytes()[..]));
+}
+
+#[test]
+fn an_rpdo_leaves_out_nan_and_infinity_of_a_real32() {
+    let mut node = node();
+    let _ = node.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(1), &mut Sent::default());
+    for (value, kept) in [(1.5, 1.5), (f32::NAN, 1.5), (f32::INFINITY, 1.5), (-2.5_f32, -2.5_f32)] {
+        let frame = Frame::new(0x205, &value.to_le_bytes()).unwrap();
+        let _ = node.on_frame(&frame, Instant(2), &mut Sent::default());
+        assert_eq!(DICTIONARY.field(0x2100, 15).load(node.image()), kept.to_le_bytes(), "{value}");
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A wrong table does not compile. `check` is a constant function: here it runs with the test, and its message is the
 //! compile error.
 
-use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, Type, check};
+use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, TableBuilder, Type, check};
 use canopen::objects;
 
 const INPUT: Object =
@@ -19,9 +19,14 @@ fn changed(mut row: Object, change: impl FnOnce(&mut Object)) -> Object {
 fn compile_error(parts: &[&[Object]]) -> Option<String> {
     let mut rows = parts.concat();
     rows.sort_by_key(Object::key);
-    std::panic::catch_unwind(move || check(&rows))
-        .err()
-        .map(|payload| payload.downcast_ref::<String>().cloned().expect("a message with index and sub-index"))
+    message_of(move || check(&rows))
+}
+
+/// The message of a panic; `None` without a panic.
+fn message_of(run: impl FnOnce() + std::panic::UnwindSafe) -> Option<String> {
+    let payload = std::panic::catch_unwind(run).err()?;
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    Some(text.or_else(|| payload.downcast_ref().cloned()).expect("a message"))
 }
 
 #[track_caller]
@@ -80,7 +85,7 @@ fn a_reserved_transmission_type_does_not_compile() {
 }
 
 #[test]
-fn a_pdo_that_is_valid_can_be_sent() {
+fn a_valid_pdo_can_be_sent() {
     let mut rows = objects::tpdo(1, &[]);
     rows[1] = rows[1].default(DefaultValue::NodeId(0x180));
     assert_error(&[&rows], "1A00h:0: the PDO is valid, but maps no object");
@@ -160,7 +165,7 @@ fn a_missing_field_is_named() {
 }
 
 #[test]
-fn a_service_has_the_rows_that_it_needs() {
+fn a_service_needs_all_its_rows() {
     let message = "1202h:0: further SDO servers begin at 1201h and have no gap";
     assert_error(&[&objects::sdo_server(3)], message);
     assert_eq!(compile_error(&[&objects::sdo_server(2), &objects::sdo_server(3)]), None);
@@ -228,7 +233,7 @@ fn the_cob_id_of_a_service_can_be_used() {
 }
 
 #[test]
-fn an_entry_that_could_not_work_does_not_compile() {
+fn an_entry_without_any_use_does_not_compile() {
     let watches = objects::heartbeat_consumer::<4>();
     let gap: Vec<Object> = watches.into_iter().filter(|row| row.sub != 2).collect();
     assert_error(&[&gap], "1016h:3: the heartbeats to monitor have no gap");
@@ -243,4 +248,106 @@ fn an_entry_that_could_not_work_does_not_compile() {
     assert_eq!(compile_error(&[&[relative.stored(Group::Communication)]]), None);
     let long = Object::new(0x2000, 0, "", Type::OctetString(200), Access::ReadWrite);
     assert_error(&[&[long]], "2000h:0: the string is longer than an SDO transfer can be");
+}
+
+/// A variable of a product, at an index from 2000h on.
+fn variable(at: usize, kind: Type) -> Object {
+    Object::new(0x2000 + u16::try_from(at).unwrap(), 0, "", kind, Access::ReadWrite)
+}
+
+/// The compile error of the run-time tables.
+fn table_error(all: &[&[Object]]) -> Option<String> {
+    let all: Vec<Vec<Object>> = all.iter().map(|rows| rows.to_vec()).collect();
+    let build = move || {
+        let all: Vec<&[Object]> = all.iter().map(Vec::as_slice).collect();
+        let _ = TableBuilder::checked(&all);
+    };
+    message_of(build)
+}
+
+#[test]
+fn values_beyond_the_largest_image_do_not_compile() {
+    let text = |count| (0..count).map(|at| variable(at, Type::OctetString(50))).collect::<Vec<_>>();
+    assert_eq!(compile_error(&[&text(1310)]), None, "65500 bytes");
+    assert_error(&[&text(1311)], "251Eh:0: the values of the table take more than 65535 bytes");
+}
+
+#[test]
+fn more_heartbeats_than_nodes_do_not_compile() {
+    let mut rows = objects::heartbeat_consumer::<128>().to_vec();
+    assert_eq!(compile_error(&[&rows]), None);
+    rows.push(changed(rows[127], |row| row.sub = 128));
+    assert_error(&[&rows], "1016h:128: at most 127 heartbeats are monitored");
+}
+
+#[test]
+fn too_many_series_of_objects_do_not_compile() {
+    // No object follows the one before, so each is a series of its own.
+    let apart = |count: usize| (0..count).map(|at| variable(2 * at, Type::Unsigned8)).collect::<Vec<_>>();
+    assert_eq!(table_error(&[&apart(1024)]), None);
+    let message = "2800h:0: the tables have more than 1024 series of objects that differ in their index only";
+    assert_eq!(table_error(&[&apart(1025)]).as_deref(), Some(message));
+    assert!(table_error(&[&apart(1000), &apart(25)]).is_some(), "all tables count together");
+}
+
+#[test]
+fn too_many_shapes_of_objects_do_not_compile() {
+    // Each object has one entry more than the one before.
+    let records = |count: u16| {
+        let entry = |index: u16, sub: u8| Object::new(index, sub, "", Type::Unsigned8, Access::ReadWrite);
+        (0..count)
+            .flat_map(|at| (0..=at as u8).map(move |sub| entry(0x2000 + at, 2 * sub)))
+            .collect::<Vec<_>>()
+    };
+    let mut fitting = records(44);
+    fitting.extend((0..34).map(|sub| Object::new(0x3000, sub, "", Type::Unsigned16, Access::ReadWrite)));
+    let twice = fitting.clone();
+    assert_eq!(table_error(&[&fitting, &twice]), None, "990 + 34 entries, and the same again");
+    let message = "202Ch:0: the objects have more than 1024 entries, those of equal objects counted once";
+    assert_eq!(table_error(&[&records(46)]).as_deref(), Some(message));
+}
+
+#[test]
+fn too_many_kinds_of_entries_do_not_compile() {
+    let limited = |count: usize| {
+        let limits = (0..count).map(|at| variable(at, Type::Unsigned16).limits(0, at as i64));
+        limits.collect::<Vec<_>>()
+    };
+    assert_eq!(table_error(&[&limited(256)]), None);
+    let message =
+        "2100h:0: the entries have more than 256 combinations of type, access, limits and other attributes";
+    assert_eq!(table_error(&[&limited(257)]).as_deref(), Some(message));
+}
+
+#[test]
+fn too_many_default_values_do_not_compile() {
+    let texts = |letter: &str| {
+        let text: &'static str = letter.repeat(50).leak();
+        let row = |at| variable(at, Type::VisibleString(50)).default(DefaultValue::Text(text));
+        (0..255).map(row).collect::<Vec<_>>()
+    };
+    let letters = ["a", "b", "c", "d", "e", "f"].map(texts);
+    let mut all = letters.each_ref().map(Vec::as_slice).to_vec();
+    let message = "2000h:0: the default values of the tables take more than 65536 bytes";
+    assert_eq!(table_error(&all).as_deref(), Some(message));
+    all[5] = all[0];
+    assert_eq!(table_error(&all), None, "63750 bytes, and the last text again");
+}
+
+#[test]
+fn too_many_dictionaries_do_not_compile() {
+    let row: &[Object] = &[variable(0, Type::Unsigned8)];
+    assert_eq!(table_error(&[row; 64]), None);
+    let message = "more than 64 dictionaries are compiled together";
+    assert_eq!(table_error(&[row; 65]).as_deref(), Some(message));
+}
+
+#[test]
+fn rows_without_remote_frames_stay_without_them() {
+    let once = objects::without_remote(objects::tpdo(1, &[INPUT]));
+    assert_eq!(once[1].default, DefaultValue::NodeId(0x4000_0180));
+    assert_eq!(objects::without_remote(once)[1].default, once[1].default);
+    let off = objects::without_remote(objects::tpdo(5, &[]));
+    assert_eq!(off[1].default, DefaultValue::Integer(0xC000_0000));
+    assert_eq!(objects::without_remote(off)[1].default, off[1].default);
 }

@@ -171,7 +171,7 @@ fn no_deadline_lies_in_the_past_after_the_last_object_of_a_multiplexed_tpdo_is_d
 }
 
 #[test]
-fn objects_that_are_chosen_in_operational_are_sent_at_once() {
+fn objects_chosen_in_operational_are_sent_at_once() {
     for event_timer in [0, 1000] {
         let mut bench = Bench::operational(false, event_timer);
         bench.run(Duration::from_millis(300));

@@ -67,7 +67,7 @@ fn a_handled_write_leaves_the_pdos_alone() {
 }
 
 #[test]
-fn a_handled_write_that_switches_a_pdo_takes_effect_at_once() {
+fn a_handled_write_switches_a_pdo_at_once() {
     let (mut device, mut sent) = operational();
     assert_eq!(download(&mut device, (0x2011, 0), &[0], Instant(2)), Ok(()));
     let mut frames = |device: &mut canopen::device!(Switch, ROWS), now| {

@@ -255,7 +255,7 @@ fn step(device: &mut Node, next: &Write, seen: &mut Seen) -> Result<(), TestCase
 }
 
 /// The device listens only to the RPDOs that exist, and to remote frames for the TPDOs that allow them.
-fn listens_to_what_exists(device: &Node) -> Result<(), TestCaseError> {
+fn listens_to_valid_pdos_only(device: &Node) -> Result<(), TestCaseError> {
     let pdos = |base: u16| (base..base + PDOS).map(|index| Pdo::read(device, index)).filter(Pdo::is_valid);
     let asked = pdos(0x1800).filter(|pdo| pdo.cob_id >> 30 == 0);
     let mut expected: Vec<u16> =
@@ -269,7 +269,7 @@ fn listens_to_what_exists(device: &Node) -> Result<(), TestCaseError> {
 }
 
 #[test]
-fn no_sequence_of_writes_makes_a_pdo_that_cannot_be() {
+fn no_sequence_of_writes_makes_an_invalid_pdo() {
     let cases = 8 * ProptestConfig::default().cases;
     let config = ProptestConfig {
         cases,
@@ -290,7 +290,7 @@ fn no_sequence_of_writes_makes_a_pdo_that_cannot_be() {
             }
             for next in sequence {
                 step(&mut device, &next, &mut seen.borrow_mut())?;
-                listens_to_what_exists(&device)?;
+                listens_to_valid_pdos_only(&device)?;
             }
             Ok(())
         })

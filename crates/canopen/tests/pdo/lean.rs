@@ -214,7 +214,7 @@ fn without_1014h_a_fault_sets_the_error_register_and_1029h_stops_the_node() {
 }
 
 #[test]
-fn an_sdo_request_does_not_delay_process_data_that_is_due() {
+fn an_sdo_request_does_not_delay_due_process_data() {
     let (mut device, mut sent) = operational(Nothing);
     download(&mut device, (0x1800, 5), &10_u16.to_le_bytes(), Instant(2)).unwrap();
     let _ = device.poll(Instant(2), &mut sent);
