@@ -8,9 +8,6 @@ pub(crate) use producer::Producer;
 use crate::sdo::Abort;
 use crate::{CanId, CobId, Frame, Span, Tick};
 
-/// The longest part of a period: a tick reaches further.
-const PART: u32 = 1 << 31;
-
 /// A SYNC message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Sync {
@@ -40,10 +37,8 @@ pub(crate) struct Settings {
 pub(crate) struct Consumer {
     id: CanId,
     settings: Settings,
-    /// When the next SYNC is missing, or a part of a long period is over; `NEVER` before the first SYNC.
+    /// When the next SYNC is missing; `NEVER` before the first SYNC.
     due: Tick,
-    /// The time after `due` until the next SYNC is missing, in us: one and a half periods can be longer than a span.
-    rest: u32,
     window_end: Tick,
     /// The last SYNC was missing, or had the wrong length.
     is_disturbed: bool,
@@ -55,7 +50,6 @@ impl Consumer {
             id: CanId::of_service(0x080, 0),
             settings: Settings { cob_id: 0x80, period: 0, window: 0, overflow: 0 },
             due: Tick::NEVER,
-            rest: 0,
             window_end: Tick::NEVER,
             is_disturbed: false,
         }
@@ -107,12 +101,10 @@ impl Consumer {
         };
         let Settings { period, window, .. } = self.settings;
         self.window_end = if window == 0 { Tick::NEVER } else { now.plus_long(window) };
-        // A SYNC that is half a period late is missing.
-        let half = period / 2;
-        (self.due, self.rest) = match period {
-            0 => (Tick::NEVER, 0),
-            1..=PART => (now.plus(Span(period + half)), 0),
-            _ => (now.plus(Span(half)), period),
+        // A SYNC that is half a period late is missing. A span beyond the ticks, of a period above 47 minutes, is not monitored.
+        self.due = match period.checked_add(period / 2) {
+            Some(limit @ 1..) => now.plus_long(limit),
+            _ => Tick::NEVER,
         };
         Ok(Sync { counter })
     }
@@ -122,22 +114,18 @@ impl Consumer {
         now > self.window_end
     }
 
-    /// The next instant at which a SYNC is missing, or a part of a long period is over.
+    /// The next instant at which a SYNC is missing.
     pub(crate) fn due(&self) -> Tick {
         self.due
     }
 
     /// Whether a SYNC is missing. Reported once.
     pub(crate) fn expire(&mut self, now: Tick) -> bool {
-        while now >= self.due {
-            let part = self.rest.min(PART);
-            if part == 0 {
-                (self.due, self.is_disturbed) = (Tick::NEVER, true);
-                return true;
-            }
-            (self.due, self.rest) = (self.due.plus(Span(part)), self.rest - part);
+        let is_missing = now >= self.due;
+        if is_missing {
+            (self.due, self.is_disturbed) = (Tick::NEVER, true);
         }
-        false
+        is_missing
     }
 
     /// Whether the SYNC before this one was missing or had the wrong length. Reported once.
