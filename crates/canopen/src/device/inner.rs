@@ -30,8 +30,6 @@ pub struct Inner<D: Definition> {
     /// Cached next deadlines. `STALE` after a change that may have moved a deadline.
     pub(super) process_due: Tick,
     pub(super) services_due: Tick,
-    /// The end of the faults that are events: [`Inner::report`].
-    pub(super) quiet_at: Tick,
     /// The first PDOs of the chains.
     pub(super) first_tpdos: Links,
     pub(super) first_rpdos: Links,
@@ -47,6 +45,8 @@ pub struct Inner<D: Definition> {
     pub(super) guarding: heartbeat::Guarding,
     pub(super) emcy: emcy::Producer,
     pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
+    /// The end of the faults that are events: [`Inner::report`].
+    pub(super) quiet_at: Tick,
     pub(super) application: D::Application,
     pub(super) tpdos: D::Tpdos,
     pub(super) rpdos: D::Rpdos,
