@@ -101,11 +101,8 @@ impl Consumer {
         };
         let Settings { period, window, .. } = self.settings;
         self.window_end = if window == 0 { Tick::NEVER } else { now.plus_long(window) };
-        // A SYNC that is half a period late is missing. A span beyond the ticks, of a period above 47 minutes, is not monitored.
-        self.due = match period.checked_add(period / 2) {
-            Some(limit @ 1..) => now.plus_long(limit),
-            _ => Tick::NEVER,
-        };
+        // A SYNC that is half a period late is missing, and one that is 71 minutes away.
+        self.due = if period == 0 { Tick::NEVER } else { now.plus_long(period.saturating_add(period / 2)) };
         Ok(Sync { counter })
     }
 

@@ -45,9 +45,9 @@ pub struct Inner<D: Definition> {
     pub(super) guarding: heartbeat::Guarding,
     pub(super) emcy: emcy::Producer,
     pub(super) watches: heartbeat::Consumer<D::Heartbeats>,
+    pub(super) application: D::Application,
     /// The end of the faults that are events: [`Inner::report`].
     pub(super) quiet_at: Tick,
-    pub(super) application: D::Application,
     pub(super) tpdos: D::Tpdos,
     pub(super) rpdos: D::Rpdos,
     pub(super) scanner: Scanner<D::Scanned>,

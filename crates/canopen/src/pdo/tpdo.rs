@@ -249,15 +249,15 @@ impl Tpdo {
 
     /// Counts SYNCs for a cyclic synchronous TPDO. Returns whether this SYNC sends it, which is every n-th one.
     fn is_sent_with(&mut self, sync: Sync, every: u8) -> bool {
-        let start = self.settings.sync_start;
-        self.is_counting |= sync.counter.is_none_or(|counter| start == 0 || start == counter);
-        if self.is_counting {
-            self.syncs = self.syncs.saturating_add(1);
+        if !self.is_counting {
+            let start = self.settings.sync_start;
+            self.is_counting = sync.counter.is_none_or(|counter| start == 0 || start == counter);
+            if !self.is_counting {
+                return false;
+            }
         }
-        let is_turn = self.syncs >= every;
-        if is_turn {
-            self.syncs = 0;
-        }
+        let is_turn = u32::from(self.syncs) + 1 >= every.into();
+        self.syncs = if is_turn { 0 } else { self.syncs + 1 };
         is_turn
     }
 
