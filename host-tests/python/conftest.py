@@ -1,5 +1,6 @@
 import os
 import random
+import signal
 import zlib
 from dataclasses import dataclass
 
@@ -9,6 +10,9 @@ from simulator import Master, Simulator
 PERSONALITIES = ("pressure", "encoder", "combined", "lift")
 NODE_IDS = (1, 16, 127)
 BIT_RATES = (10, 250, 1000)
+
+# A shell starts a program in the background with Ctrl-C ignored, and its children inherit this: a test that presses Ctrl-C would wait.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @dataclass(frozen=True)
