@@ -15,7 +15,7 @@ from statistics import median
 
 import websocket
 from full_bus import Client
-from simulator import Simulator
+from simulator import Master, Simulator
 from test_update import identification, image
 
 IS_THOROUGH = os.environ.get("THOROUGH") == "1"
@@ -132,6 +132,7 @@ def latency(page: Client) -> float:
 def test_the_page_with_the_token_reads_and_updates_beside_hostile_clients(tmp_path: Path):
     b = image(tmp_path / "b.img", "0.2.0")
     simulator = Simulator("--bitrate", "1000", "--control", "127.0.0.1:0", speed="real")
+    Master(simulator).close()
     page = Client(simulator.greeting["page"])
     page.ask("values", node=1)
     alone = [latency(page) for _ in range(3)]
