@@ -10,7 +10,7 @@ use programmer::probe::Board;
 
 use start::output;
 
-use crate::command::{become_program, built};
+use crate::command::become_program;
 use crate::setup;
 use crate::target::Toolchain;
 use crate::{images, own_tool};
@@ -58,8 +58,8 @@ impl Flags {
         Ok(())
     }
 
-    fn tool(&self, bootloader: &Path, application: &Path) -> Command {
-        let mut tool = Command::new(built("flash"));
+    /// The call of the tool with these flags.
+    fn call(&self, mut tool: Command, bootloader: &Path, application: &Path) -> Command {
         tool.arg("--bootloader").arg(bootloader).arg("--application").arg(application);
         let flags = [("--dry-run", self.dry_run), ("--no-log", self.no_log)];
         tool.args(flags.iter().filter(|(_, is_set)| *is_set).map(|(flag, _)| flag));
@@ -79,12 +79,12 @@ impl Flags {
 
 pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     flags.check()?;
-    own_tool::build("flash")?;
+    let tool = own_tool::build("flash")?;
     let toolchain = Toolchain::ensure()?;
     if flags.development && flags.application.is_none() {
         // The images that `cargo xtask bringup` compares with the flash.
         let images = images::compile_node(&toolchain, images::CHIP)?;
-        return become_program(&mut flags.tool(&images.join("bootloader"), &images.join("firmware")));
+        return become_program(&mut flags.call(tool, &images.join("bootloader"), &images.join("firmware")));
     }
     let application = match &flags.application {
         Some(path) => std::path::absolute(path)?,
@@ -96,15 +96,15 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     }
     keys.extend(flags.root_key.iter().chain(&flags.recovery_key).cloned());
     let bootloader = images::compile_bootloader(&toolchain, &keys)?;
-    become_program(&mut flags.tool(&bootloader, &application))
+    become_program(&mut flags.call(tool, &bootloader, &application))
 }
 
 /// The public half of the key in this file, as hexadecimal digits.
 fn variable(key: &Path) -> Result<String> {
     let path = key.to_str().context("a path that is no text")?;
-    own_tool::build("sign")?;
-    let line = output(built("sign"), &["public", "--rank", "release", path]).with_context(|| {
-        format!("the key cannot be read: `cargo xtask sign public --rank release {path}` says more")
-    })?;
+    let line = output(own_tool::build("sign")?.get_program(), &["public", "--rank", "release", path])
+        .with_context(|| {
+            format!("the key cannot be read: `cargo xtask sign public --rank release {path}` says more")
+        })?;
     Ok(line.split_once('=').context("`sign public` prints a variable")?.1.to_owned())
 }

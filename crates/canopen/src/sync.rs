@@ -101,7 +101,7 @@ impl Consumer {
         };
         let Settings { period, window, .. } = self.settings;
         self.window_end = if window == 0 { Tick::NEVER } else { now.plus_long(window) };
-        // A SYNC that is half a period late is missing, and one that is 71 minutes away.
+        // A SYNC is missing after one and a half periods, at the latest after 71 minutes.
         self.due = if period == 0 { Tick::NEVER } else { now.plus_long(period.saturating_add(period / 2)) };
         Ok(Sync { counter })
     }

@@ -148,11 +148,11 @@ impl<'a> Report<'a> {
         self.ensure_none_failed()
     }
 
-    /// Runs the steps of a lane while it goes on.
-    fn lane(&self, steps: Vec<Step>, goes_on: impl Fn() -> bool) {
+    /// Runs the steps of a lane, each if it may begin.
+    fn lane(&self, steps: Vec<Step>, may_begin: impl Fn() -> bool) {
         for step in steps {
             let is_skipped = self.only.is_some_and(|only| !step.name.contains(only));
-            if is_skipped || !goes_on() {
+            if is_skipped || !may_begin() {
                 continue;
             }
             eprintln!("== {}", step.name);

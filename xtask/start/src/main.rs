@@ -1,4 +1,4 @@
-//! The start of `cargo xtask` and `cargo sim`. This program compiles in a second. If something is missing that only the
+//! The start of `cargo xtask`, `cargo sim` and `cargo nodectl`. This program compiles in a second. If something is missing that only the
 //! user can install, it prints the one command; otherwise it starts xtask.
 
 use std::path::Path;
