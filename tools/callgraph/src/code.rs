@@ -1,28 +1,39 @@
 //! The instructions of a function, as far as they call, jump or take stack.
 
-use std::collections::BTreeMap;
-
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use capstone::arch::arm::{ArchExtraMode, ArchMode, ArmOperand, ArmOperandType, ArmReg};
 use capstone::arch::{BuildsCapstone, BuildsCapstoneExtraMode, DetailsArchInsn};
-use capstone::{AccessType, Capstone, Insn, InsnGroupId, InsnGroupIdInt, InsnGroupType, RegId, RegIdInt};
+use capstone::{Capstone, Insn, InsnGroupId, InsnGroupIdInt, InsnGroupType, RegId, RegIdInt};
 
 use crate::image::{Function, Image};
 use crate::lists::leaves_the_image;
+use crate::registers::Registers;
 
 /// A way out of a function into another one.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Way {
     /// The instruction.
     pub(crate) at: u32,
     /// The start of the other function.
     pub(crate) to: u32,
+    /// The constants on the way.
+    pub(crate) registers: Registers,
+}
+
+/// A way out of a function through a register that its caller has filled. The compiler's outliner makes a function of
+/// lines that other functions share: the constant is theirs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Through {
+    /// The instruction.
+    pub(crate) at: u32,
+    pub(crate) register: RegId,
 }
 
 /// The calls and the stack use of a function.
 #[derive(Debug, Default)]
 pub(crate) struct Body {
     pub(crate) ways: Vec<Way>,
+    pub(crate) through: Vec<Through>,
     /// Bytes that all instructions together take of the stack.
     pub(crate) stack: u32,
     /// Whether one of the instructions takes a number of bytes that a register holds.
@@ -31,11 +42,9 @@ pub(crate) struct Body {
 
 const SP: RegId = RegId(ArmReg::ARM_REG_SP as RegIdInt);
 const LR: RegId = RegId(ArmReg::ARM_REG_LR as RegIdInt);
-const PC: RegId = RegId(ArmReg::ARM_REG_PC as RegIdInt);
-const BRANCHES: [InsnGroupId; 2] = [
-    InsnGroupId(InsnGroupType::CS_GRP_CALL as InsnGroupIdInt),
-    InsnGroupId(InsnGroupType::CS_GRP_JUMP as InsnGroupIdInt),
-];
+pub(crate) const PC: RegId = RegId(ArmReg::ARM_REG_PC as RegIdInt);
+const CALL: InsnGroupId = InsnGroupId(InsnGroupType::CS_GRP_CALL as InsnGroupIdInt);
+const JUMP: InsnGroupId = InsnGroupId(InsnGroupType::CS_GRP_JUMP as InsnGroupIdInt);
 
 /// An instruction as text.
 #[derive(Clone, Debug)]
@@ -57,21 +66,10 @@ impl Decoder {
 
     /// Reads a function.
     pub(crate) fn body(&self, image: &Image<'_>, function: &Function) -> Result<Body> {
-        let mut reader = Reader { image, function, constants: BTreeMap::new(), body: Body::default() };
+        let mut reader = Reader { image, function, registers: Registers::default(), body: Body::default() };
         for (start, end) in image.code(function) {
-            let bytes = image.bytes(start, end)?;
-            let instructions = self.0.disasm_all(bytes, start.into())?;
-            let read: usize = instructions.iter().map(Insn::len).sum();
-            ensure!(
-                read == bytes.len(),
-                "no instruction at {:#010x} in {}",
-                start as usize + read,
-                function.name
-            );
-            for instruction in instructions.iter() {
-                self.take(&mut reader, instruction)
-                    .with_context(|| format!("{instruction} in {}", function.name))?;
-            }
+            self.steps(image.bytes(start, end)?, start, |step| reader.take(step))
+                .with_context(|| format!("in {}", function.name))?;
         }
         Ok(reader.body)
     }
@@ -92,28 +90,48 @@ impl Decoder {
         Ok(lines)
     }
 
-    fn take(&self, reader: &mut Reader<'_>, instruction: &Insn<'_>) -> Result<()> {
+    /// Hands the instructions of this code to `take`, one after the other.
+    pub(crate) fn steps(
+        &self,
+        code: &[u8],
+        start: u32,
+        mut take: impl FnMut(&Step<'_>) -> Result<()>,
+    ) -> Result<()> {
+        let instructions = self.0.disasm_all(code, start.into())?;
+        let read: usize = instructions.iter().map(Insn::len).sum();
+        ensure!(read == code.len(), "no instruction at {:#010x}", start as usize + read);
+        for instruction in instructions.iter() {
+            self.step(instruction, &mut take).with_context(|| instruction.to_string())?;
+        }
+        Ok(())
+    }
+
+    fn step(&self, instruction: &Insn<'_>, take: impl FnOnce(&Step<'_>) -> Result<()>) -> Result<()> {
         let detail = self.0.insn_detail(instruction)?;
         let arch = detail.arch_detail();
         let arm = arch.arm().context("not an instruction of Arm")?;
         let operands: Vec<_> = arm.operands().collect();
-        reader.take(&Step {
+        let groups = detail.groups();
+        take(&Step {
             at: u32::try_from(instruction.address())?,
             mnemonic: instruction.mnemonic().unwrap_or_default().trim_end_matches(".w"),
             operands: &operands,
-            is_branch: detail.groups().iter().any(|group| BRANCHES.contains(group)),
+            is_branch: groups.contains(&CALL) || groups.contains(&JUMP),
+            is_call: groups.contains(&CALL),
             writes_back: arm.writeback(),
         })
     }
 }
 
 /// One instruction.
-struct Step<'a> {
-    at: u32,
+pub(crate) struct Step<'a> {
+    pub(crate) at: u32,
     /// The mnemonic without the suffix of a wide encoding.
-    mnemonic: &'a str,
-    operands: &'a [ArmOperand],
+    pub(crate) mnemonic: &'a str,
+    pub(crate) operands: &'a [ArmOperand],
     is_branch: bool,
+    /// Whether the instruction comes back: LR then holds the address behind it.
+    pub(crate) is_call: bool,
     writes_back: bool,
 }
 
@@ -187,8 +205,7 @@ fn size(operand: &ArmOperand) -> u32 {
 struct Reader<'a> {
     image: &'a Image<'a>,
     function: &'a Function,
-    /// Registers that hold a constant address. A compiler that optimises for size calls through such a register.
-    constants: BTreeMap<RegId, u32>,
+    registers: Registers,
     body: Body,
 }
 
@@ -197,12 +214,13 @@ impl Reader<'_> {
         ensure!(!step.loads_pc(), "jumps through memory");
         match step.target() {
             Some(Target::Address(to)) => self.leave(step.at, to)?,
-            Some(Target::Register(register)) => match self.constants.get(&register) {
-                Some(&to) => self.leave(step.at, to)?,
-                None => ensure!(
-                    leaves_the_image(&self.function.name),
-                    "calls through a register that holds no constant"
-                ),
+            Some(Target::Register(register)) => match self.registers.constant(register) {
+                Some(to) => self.leave(step.at, to)?,
+                None if leaves_the_image(&self.function.name) => {}
+                None if self.registers.is_of_caller(register) => {
+                    self.body.through.push(Through { at: step.at, register });
+                }
+                None => bail!("calls through a register that holds no constant"),
             },
             None => {}
         }
@@ -210,60 +228,14 @@ impl Reader<'_> {
             Some(bytes) => self.body.stack += bytes,
             None => self.body.is_variable = true,
         }
-        self.learn(step)
+        self.registers.learn(step, |address| self.image.word(address))
     }
 
     fn leave(&mut self, at: u32, to: u32) -> Result<()> {
         let other = self.image.function_at(to).with_context(|| format!("{to:#010x} is in no function"))?;
         if other.start != self.function.start {
-            self.body.ways.push(Way { at, to: other.start });
+            self.body.ways.push(Way { at, to: other.start, registers: self.registers.clone() });
         }
         Ok(())
-    }
-
-    /// Notes the constants in registers. Instructions come in the order of their addresses, so that a constant is known
-    /// before the calls through its register.
-    fn learn(&mut self, step: &Step<'_>) -> Result<()> {
-        let known = match (step.mnemonic, step.operands) {
-            ("movw", [_, from]) => immediate(from),
-            ("movt", [to, from]) => {
-                self.constant(to).zip(immediate(from)).map(|(low, high)| high << 16 | low & 0xFFFF)
-            }
-            ("mov", [_, from]) => self.constant(from),
-            ("ldr", [_, from]) => match from.op_type {
-                ArmOperandType::Mem(place) if place.base() == PC => {
-                    let pc = (step.at & !3) + 4;
-                    Some(self.image.word(pc.wrapping_add_signed(place.disp()))?)
-                }
-                _ => None,
-            },
-            _ => None,
-        };
-        for operand in step.operands {
-            let is_written = operand.access.is_some_and(AccessType::is_writable);
-            if let (ArmOperandType::Reg(register), true) = (&operand.op_type, is_written) {
-                self.constants.remove(register);
-            }
-        }
-        if let (Some(ArmOperandType::Reg(register)), Some(value)) =
-            (step.operands.first().map(|to| &to.op_type), known)
-        {
-            self.constants.insert(*register, value);
-        }
-        Ok(())
-    }
-
-    fn constant(&self, operand: &ArmOperand) -> Option<u32> {
-        match operand.op_type {
-            ArmOperandType::Reg(register) => self.constants.get(&register).copied(),
-            _ => None,
-        }
-    }
-}
-
-fn immediate(operand: &ArmOperand) -> Option<u32> {
-    match operand.op_type {
-        ArmOperandType::Imm(value) => Some(value.cast_unsigned()),
-        _ => None,
     }
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::code::{Body, Decoder, Way};
-use crate::image::Image;
+use crate::code::{Body, Decoder, Through, Way};
+use crate::image::{Function, Image};
 
 /// The functions of an image, by their start.
 pub(crate) struct Graph(BTreeMap<u32, Body>);
@@ -22,7 +22,41 @@ impl Graph {
     pub(crate) fn of(image: &Image<'_>) -> Result<Graph> {
         let decoder = Decoder::new()?;
         let bodies = image.functions().map(|function| Ok((function.start, decoder.body(image, function)?)));
-        Ok(Graph(bodies.collect::<Result<_>>()?))
+        let mut graph = Graph(bodies.collect::<Result<_>>()?);
+        graph.follow_callers(image)?;
+        Ok(graph)
+    }
+
+    /// Adds the ways through a register that only the callers have filled.
+    fn follow_callers(&mut self, image: &Image<'_>) -> Result<()> {
+        let mut found = Vec::new();
+        for function in image.functions() {
+            let through = self.0.get(&function.start).into_iter().flat_map(|body| &body.through);
+            for branch in through {
+                let ways = self.through(image, function, *branch);
+                let ways = ways.with_context(|| format!("{:#09x} in {}", branch.at, function.name))?;
+                found.extend(ways.into_iter().map(|way| (function.start, way)));
+            }
+        }
+        for (start, way) in found {
+            self.0.entry(start).or_default().ways.push(way);
+        }
+        Ok(())
+    }
+
+    /// The ways on from a branch through a register, one for each caller of its function.
+    fn through(&self, image: &Image<'_>, function: &Function, branch: Through) -> Result<Vec<Way>> {
+        let callers = self.0.values().flat_map(|body| &body.ways).filter(|way| way.to == function.start);
+        let ways = callers.map(|caller| {
+            let constant = caller.registers.constant(branch.register);
+            let to =
+                constant.with_context(|| format!("the caller at {:#09x} holds no constant", caller.at))?;
+            let to = image.function_at(to).with_context(|| format!("{to:#010x} is in no function"))?;
+            Ok(Way { at: branch.at, to: to.start, registers: caller.registers.clone() })
+        });
+        let ways: Vec<Way> = ways.collect::<Result<_>>()?;
+        ensure!(!ways.is_empty(), "calls through a register that holds no constant, and has no caller");
+        Ok(ways)
     }
 
     pub(crate) fn bodies(&self) -> impl Iterator<Item = (u32, &Body)> {

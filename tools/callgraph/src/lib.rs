@@ -12,6 +12,7 @@ mod graph;
 mod image;
 mod lists;
 mod panics;
+mod registers;
 mod stack;
 mod tasks;
 
