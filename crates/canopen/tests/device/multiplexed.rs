@@ -298,6 +298,21 @@ fn the_application_leaves_out_missing_objects() {
     assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]]);
 }
 
+/// Who listens may have lost the value meanwhile.
+#[test]
+fn an_object_that_is_selected_again_is_sent_with_the_value_it_had() {
+    let mut bench = sender(DESTINATION);
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 3, "entering Operational");
+    let second = Multiplexer { index: 0x6000, sub: 2 };
+    for (not_told, expected) in [(Some(second), vec![]), (None, vec![[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]])] {
+        bench.device.application_mut().not_told = not_told;
+        bench.write(0x6201, 0, &[1]).unwrap();
+        bench.run(Duration::from_millis(1));
+        assert_eq!(mpdos(&mut bench), expected);
+    }
+}
+
 #[test]
 fn reconfiguration_does_not_shorten_the_inhibit_time() {
     let mut bench = sender(DESTINATION);
