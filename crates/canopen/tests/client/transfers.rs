@@ -1,9 +1,11 @@
 //! All transfers of many lengths, and the effect of lost, doubled and wrong frames.
 
-use canopen::Instant;
-use canopen::client::Service;
-use canopen::client::sdo::{AbortCode, BlockDownload, BlockUpload, Buffer, Download, Error, Options, Upload};
+use canopen::client::sdo::{
+    AbortCode, BlockDownload, BlockUpload, Buffer, Download, Error, Options, SEGMENT_TIME, Upload,
+};
+use canopen::client::{Service, Step, Taken};
 use canopen::sdo::{Abort, BlockSize, Response};
+use canopen::{Frame, Instant};
 
 use crate::server::{Device, NODE, OBJECT, Outcome, Server, once, run};
 
@@ -169,6 +171,27 @@ fn silence_takes_the_time_outs_and_aborts_at_the_server() {
     assert_eq!(commands, [0x40, 0x80, 0x40, 0x80]);
     assert_eq!(sent[1].data()[4..], [0x00, 0x00, 0x04, 0x05]);
     assert!(matches!(transfer.next(end), canopen::client::Step::Done(Err(Error::NoAnswer))));
+}
+
+/// All segments of a block are handed to the adapter at once. On a busy bus the last one is sent seconds later.
+#[test]
+fn the_answer_to_a_block_has_the_time_of_its_segments_too() {
+    let data = value(889);
+    let mut download = BlockDownload::new(NODE, OBJECT, &data, once());
+    let sends = |step| matches!(step, Step::Send(_));
+    let tell = |download: &mut BlockDownload<'_>, answer: Response, now| {
+        let frame = Frame::new(0x580 + u16::from(NODE.get()), &answer.encode()).unwrap();
+        assert_eq!(download.on_frame(&frame, Instant(now)), Taken::Used);
+    };
+    assert!(sends(download.next(Instant(0))));
+    tell(&mut download, Response::BlockDownload(OBJECT, BlockSize::MAX), 0);
+    for _ in 0..127 {
+        assert!(sends(download.next(Instant(0))));
+    }
+    let latest = once().timeout.0 + 127 * SEGMENT_TIME.0;
+    assert_eq!(download.next(Instant(latest - 1)), Step::Wait(Instant(latest)));
+    tell(&mut download, Response::BlockAcknowledge(127, BlockSize::MAX), latest - 1);
+    assert!(sends(download.next(Instant(latest))), "the end of the transfer");
 }
 
 #[test]

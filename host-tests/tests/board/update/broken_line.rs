@@ -10,7 +10,7 @@ use sim::world::World;
 use super::bench::{version_a, version_b};
 use super::fleet::{Outage, PERSONALITIES, Shared, share, update_while};
 use crate::broken_line::noise;
-use crate::support::world;
+use crate::support::{Master, SECOND, frame, world};
 
 /// Longer than the period of the heartbeat, so that each node has something to send in it.
 const NOISE: Time = Time::from_millis(1500);
@@ -45,6 +45,37 @@ fn nodectl_completes_an_update_over_a_line_that_breaks_at_any_time() {
             summary.nodes[0].incidents.iter().all(|incident| incident.ends_with("reset by software"));
         assert!(is_clean, "{told}: {summary}");
         assert!(summary.bus.errors > 0, "{told}: {summary}");
+    }
+}
+
+/// A station that leaves the update four frames in a hundred for ten seconds: a block takes longer than the time-out of its
+/// answer. The client of a second update, of a node with a smaller node-ID, is such a station.
+#[test]
+fn a_node_whose_frames_wait_for_more_urgent_ones_is_not_lost() {
+    const MORE_URGENT: u16 = 0x101;
+    const FRAMES: usize = 130;
+    const PERIOD: Time = Time::from_millis(60);
+    let kbit = 250;
+    for (personality, node) in PERSONALITIES.into_iter().zip([1, 16, 33, 127]) {
+        let world: Shared = share(world(&format!("--bitrate {kbit} --node {node}:{personality}")));
+        let urgent = Master::join_at(&mut world.borrow_mut(), kbit * 1000);
+        let begin = world.borrow().now() + Time::from_millis(5000);
+        let mut next = begin;
+        let happens = move |world: &mut World| {
+            if world.now() >= next && next < begin + SECOND * 10 {
+                (0..FRAMES).for_each(|_| urgent.send(world, MORE_URGENT, &[0x55; 8]));
+                next = next + PERIOD;
+            }
+        };
+        let reports = update_while(&world, &node.to_string(), &version_b(0), happens, &[]).unwrap();
+        assert_eq!(reports[0]["result"], "updated", "{reports:?}");
+        let frames = world.borrow_mut().take_frames();
+        let requests = frames.iter().filter(|stamped| stamped.frame.id() == frame(0x600 + node, &[]).id());
+        let data: Vec<_> = requests.map(|stamped| stamped.frame.bytes()).collect();
+        assert!(
+            !data.iter().any(|data| data.starts_with(&[0x80, 0x50, 0x1F, 0x01])),
+            "{personality}: a block was given up"
+        );
     }
 }
 

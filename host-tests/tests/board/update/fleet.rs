@@ -28,7 +28,7 @@ pub(super) struct Outage {
 }
 
 impl Outage {
-    const LENGTH: Time = Time::from_millis(8_000);
+    const LENGTH: Time = Time::from_millis(12_000);
 
     /// A failure halfway through the flash operations of an image's download.
     fn halfway(world: &Shared, board: usize, image: &Image) -> Outage {

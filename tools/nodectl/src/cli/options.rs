@@ -36,7 +36,7 @@ pub struct Options {
     #[arg(long, global = true)]
     pub json: bool,
 
-    /// How long a node may take to answer, in milliseconds.
+    /// How long a node may take to answer, in milliseconds. A block has 30 ms more for each of its segments.
     #[arg(long, global = true, value_name = "MS", default_value_t = 1000)]
     pub timeout: u32,
 

@@ -1,7 +1,7 @@
 //! The client of one node.
 
 use canopen::client::Service;
-use canopen::client::sdo::{self, BlockDownload, BlockUpload, Download, Upload};
+use canopen::client::sdo::{self, BlockDownload, BlockUpload, Download, SEGMENT_TIME, Upload};
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
 
@@ -9,9 +9,6 @@ use super::channel::Via;
 use super::memory::Memory;
 use super::{Cause, Error, Options};
 use crate::network::Network;
-
-/// The time of a segment and its answer at 10 kbit/s.
-const SEGMENT: Duration = Duration::from_millis(30);
 
 /// The SDO client of one node.
 pub struct Client<'n> {
@@ -106,7 +103,7 @@ impl<'n> Client<'n> {
     fn patience(&self, value: &[u8]) -> Options {
         let segments = u64::try_from(value.len() / 7).unwrap_or(u64::MAX);
         let options = self.options();
-        let limit = Duration(options.limit.0.saturating_add(segments.saturating_mul(SEGMENT.0)));
+        let limit = Duration(options.limit.0.saturating_add(segments.saturating_mul(SEGMENT_TIME.0)));
         Options { limit, ..options }
     }
 

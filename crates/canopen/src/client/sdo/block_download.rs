@@ -90,7 +90,7 @@ impl transfer::Protocol for Protocol<'_> {
         link.begin(Request::BlockDownload { at: link.at, crc: true, size });
     }
 
-    fn segment(&mut self, link: &mut Link) -> Option<[u8; 8]> {
+    fn segment(&mut self, link: &mut Link) -> Option<BlockSegment> {
         let Phase::Block { size, sent } = self.phase else { return None };
         let sequence = BlockSize::new(sent.saturating_add(1)).filter(|next| next.get() <= self.len(size))?;
         let rest = self.rest(sent);
@@ -101,7 +101,7 @@ impl transfer::Protocol for Protocol<'_> {
             // Acknowledgements of two blocks of the same size are equal.
             link.expect_equal();
         }
-        Some(segment.encode())
+        Some(segment)
     }
 
     fn on_response(&mut self, data: [u8; 8], link: &mut Link, _: Instant) -> Result<Progress, Error> {

@@ -1,8 +1,8 @@
 //! The state that all kinds of transfer share: the CAN-IDs, the frame to send next, and the deadline of the answer.
 
-use super::{AbortCode, Error, Options};
+use super::{AbortCode, Error, Options, SEGMENT_TIME};
 use crate::client::service::later;
-use crate::sdo::{Abort, Multiplexer, Request, Response};
+use crate::sdo::{Abort, BlockSegment, Multiplexer, Request, Response};
 use crate::{CanId, Duration, Frame, Instant, NodeId};
 
 /// CAN-IDs of the default SDO channel without the node-ID (CiA 301, 7.3.5).
@@ -88,11 +88,13 @@ impl Link {
         Some(self.frame(data))
     }
 
-    /// A frame for a segment of a block. The answer is due within the usual time-out.
-    pub(super) fn segment(&mut self, data: [u8; 8], now: Instant) -> Frame {
+    /// A frame for a segment of a block. The answer is due within the usual time-out after the segments, which may all
+    /// wait still.
+    pub(super) fn segment(&mut self, segment: BlockSegment, now: Instant) -> Frame {
         self.has_unexpected = false;
-        self.answer_by = later(now, self.options.timeout);
-        self.frame(data)
+        let sending = SEGMENT_TIME.0 * u64::from(segment.sequence.get());
+        self.answer_by = later(now + Duration(sending), self.options.timeout);
+        self.frame(segment.encode())
     }
 
     fn frame(&self, data: [u8; 8]) -> Frame {

@@ -22,7 +22,7 @@ mod upload;
 pub use abort_code::AbortCode;
 pub use error::Error;
 pub use link::Channel;
-pub use options::Options;
+pub use options::{Options, SEGMENT_TIME};
 pub use sink::{Buffer, Sink};
 pub use transfer::Transfer;
 

@@ -3,10 +3,14 @@
 use crate::Duration;
 use crate::sdo::BlockSize;
 
+/// The time of a segment on its way to the server: a frame and a more urgent one before it, at 10 kbit/s.
+pub const SEGMENT_TIME: Duration = Duration::from_millis(30);
+
 /// Time-outs, retries and block size of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The longest time until the server answers a request.
+    /// The longest time until the server answers a request. A block has [`SEGMENT_TIME`] more for each of its segments,
+    /// because they wait in the adapter, and for more urgent frames on the bus.
     pub timeout: Duration,
     /// The longest time of a transfer, including retries.
     pub limit: Duration,

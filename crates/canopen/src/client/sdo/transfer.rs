@@ -4,7 +4,7 @@ use super::link::{Channel, Link};
 use super::{Error, Options};
 use crate::client::service::later;
 use crate::client::{Service, Step, Taken};
-use crate::sdo::Multiplexer;
+use crate::sdo::{BlockSegment, Multiplexer};
 use crate::{Frame, Instant};
 
 /// One kind of transfer: its requests, and its reaction to the answers.
@@ -19,7 +19,7 @@ pub trait Protocol {
     fn on_response(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error>;
 
     /// The next segment of a block; `None` when all are sent.
-    fn segment(&mut self, _: &mut Link) -> Option<[u8; 8]> {
+    fn segment(&mut self, _: &mut Link) -> Option<BlockSegment> {
         None
     }
 
@@ -142,8 +142,8 @@ impl<P: Protocol> Service for Transfer<P> {
                 Phase::Over(result) => return Step::Done(result),
                 Phase::Again | Phase::New => self.begin(),
                 Phase::Running => {
-                    if let Some(data) = self.protocol.segment(&mut self.link) {
-                        return Step::Send(self.link.segment(data, now));
+                    if let Some(segment) = self.protocol.segment(&mut self.link) {
+                        return Step::Send(self.link.segment(segment, now));
                     }
                     if now < self.link.answer_by() {
                         return Step::Wait(self.link.answer_by().min(self.end));
