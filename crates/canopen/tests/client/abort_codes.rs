@@ -16,3 +16,9 @@ fn every_code_of_our_server_has_words() {
         assert!(AbortCode::from(abort).meaning().is_some(), "{abort:?}");
     }
 }
+
+#[test]
+fn two_codes_say_that_there_is_no_such_entry() {
+    let absent = Abort::ALL.into_iter().filter(|&abort| AbortCode::from(abort).is_absent());
+    assert_eq!(absent.collect::<Vec<_>>(), [Abort::NoObject, Abort::NoSubIndex]);
+}

@@ -55,6 +55,11 @@ impl Slaves {
                 self.waiting.retain(|(identity, _)| Some(*identity) != self.selected);
                 matches.then_some(Response::Identified)
             }
+            Request::Select(Part::Serial, serial) => {
+                let found = self.waiting.iter().position(|(identity, _)| identity.serial == serial)?;
+                self.selected = Some(self.waiting.remove(found).0);
+                Some(Response::Selected)
+            }
             Request::Inquire(part) => Some(Response::Identity(part, self.selected?.part(part))),
             Request::NodeId(id) => self.selected.map(|_| Response::NodeId(u8::from(id > 127))),
             _ => None,
@@ -134,4 +139,13 @@ fn a_scan_reports_its_progress() {
         }
     }
     assert_eq!(asked, (0..Fastscan::QUESTIONS).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_slave_is_selected_by_its_identity() {
+    let mut slaves = Slaves::new(&[5, 7], 0..0);
+    let (seven, eight) = (slaves.waiting[1].0, Identity { serial: 8, ..slaves.waiting[1].0 });
+    assert_eq!(run(lss::select(&seven, OPTIONS), &mut slaves), Ok(()));
+    assert_eq!(slaves.selected, Some(seven));
+    assert_eq!(run(lss::select(&eight, OPTIONS), &mut slaves), Err(Error::NoAnswer(Name::Select)));
 }

@@ -4,7 +4,7 @@ use canopen::client::sdo::{
     AbortCode, BlockDownload, BlockUpload, Buffer, Download, Error, Options, SEGMENT_TIME, Upload,
 };
 use canopen::client::{Service, Step, Taken};
-use canopen::sdo::{Abort, BlockSize, Response};
+use canopen::sdo::{Abort, BlockSize, Bytes, Multiplexer, Response};
 use canopen::{Frame, Instant};
 
 use crate::server::{Device, NODE, OBJECT, Outcome, Server, once, run};
@@ -143,18 +143,33 @@ fn a_refusal_ends_a_transfer_at_once_and_is_not_answered() {
 fn a_late_abort_message_is_passed_over() {
     let mut server = Server::new(&[1, 2]);
     let mut late = |request: [u8; 8]| {
-        let other = canopen::sdo::Multiplexer { index: 0x2001, sub: 0 };
+        let other = Multiplexer { index: 0x2001, sub: 0 };
         let late = Response::Abort(other, Abort::TimeOut.code()).encode();
         [vec![late], server.answer(request)].concat()
     };
     assert_eq!(upload(&mut late, once()).1, [1, 2]);
 }
 
+#[test]
+fn an_answer_for_another_object_ends_nothing() {
+    let other = Multiplexer { index: 0x2001, sub: 0 };
+    let bytes = Bytes::from_slice(&[1, 2]);
+    for answer in [Response::Uploaded(other, bytes), Response::UploadSegmented(other, Some(9))] {
+        let mut wrong = |_: [u8; 8]| vec![answer.encode()];
+        assert_eq!(upload(&mut wrong, once()).0, Err(Error::Unexpected), "{answer:?}");
+    }
+    let mut wrong = |_: [u8; 8]| vec![Response::Downloaded(other).encode()];
+    for data in [&[1][..], &[0; 9]] {
+        let mut download = Download::new(NODE, OBJECT, data, once());
+        assert_eq!(run(&mut download, &mut wrong).0, Err(Error::Unexpected), "{data:?}");
+    }
+}
+
 /// A server without block transfers may name the object of the previous transfer.
 #[test]
 fn an_unknown_request_is_refused_with_any_object_in_the_answer() {
     let mut simple = |_: [u8; 8]| {
-        let before = canopen::sdo::Multiplexer { index: 0x1F56, sub: 1 };
+        let before = Multiplexer { index: 0x1F56, sub: 1 };
         vec![Response::Abort(before, Abort::Command.code()).encode()]
     };
     assert_eq!(block_upload(&mut simple, once()).0, Err(Error::Abort(AbortCode(0x0504_0001))));

@@ -5,7 +5,7 @@ use canopen::client::{Service, Step};
 use canopen::dictionary::{Access, Dictionary, Group, Object, Services, Sizes, Type};
 use canopen::nmt::Command;
 use canopen::sdo::{BlockSize, Multiplexer, Request};
-use canopen::{Action, Device, Frame, Instant, NodeId, objects};
+use canopen::{Action, Definition, Device, Frame, Instant, NodeId, objects};
 
 use crate::exchange;
 use crate::service_device::Loader;
@@ -260,6 +260,41 @@ fn the_cob_ids_of_a_channel_follow_the_rules() {
         assert_eq!(write(&mut node, (index, 3), &[9]), Ok(()));
     }
     assert_eq!(write(&mut node(), (0x1200, 1), &[0; 4]), Err(0x0601_0002));
+}
+
+const OF_SERVER: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register()],
+    objects::sdo_server(2),
+    objects::identity(0, 1, 1)
+);
+const OF_CLIENT: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register()],
+    objects::sdo_client(1),
+    objects::identity(0, 1, 1)
+);
+
+/// The service identifiers of a device with one channel, which is enabled.
+fn service_ids<D: Definition<Application = Loader>>(dictionary: &'static Dictionary, index: u16) -> Vec<u16> {
+    let mut node: Device<D> = Device::new(dictionary, NodeId::new(ID), Loader::default());
+    let _ = node.start(Instant(0), &mut Sent::default());
+    for (sub, id) in [(1, SECOND.0), (2, SECOND.1)] {
+        let written =
+            exchange::write(ID, Multiplexer { index, sub }, &u32::from(id).to_le_bytes(), |request| {
+                let mut sent = Sent::default();
+                let _ = node.on_service_frame(&request, Instant(1), &mut sent);
+                sent.0
+            });
+        assert_eq!(written, Ok(()));
+    }
+    node.service_ids().map(canopen::CanId::get).collect()
+}
+
+#[test]
+fn a_device_with_one_kind_of_channel_receives_its_frames() {
+    static SERVER: Dictionary = canopen::dictionary!(OF_SERVER);
+    static CLIENT: Dictionary = canopen::dictionary!(OF_CLIENT);
+    assert!(service_ids::<canopen::definition!(Loader, OF_SERVER)>(&SERVER, 0x1201).contains(&SECOND.0));
+    assert!(service_ids::<canopen::definition!(Loader, OF_CLIENT)>(&CLIENT, 0x1280).contains(&SECOND.1));
 }
 
 #[test]

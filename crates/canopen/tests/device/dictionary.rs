@@ -31,3 +31,9 @@ fn missing_objects_and_sub_indices_have_different_codes() {
         assert_eq!(DICTIONARY.find(index, 0).unwrap_err(), Abort::NoObject, "{index:04X}h");
     }
 }
+
+#[test]
+#[should_panic(expected = "the entry has another type")]
+fn an_unsigned_value_is_no_variable_of_a_signed_type() {
+    let _ = DICTIONARY.variable::<i16>(0x1015, 0);
+}

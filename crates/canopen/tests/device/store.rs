@@ -1,7 +1,7 @@
 //! Storing and loading: 1010h, 1011h, and the packed values.
 
 use crate::bench::{Bench, DICTIONARY, ID};
-use canopen::dictionary::{Group, Groups};
+use canopen::dictionary::{Access, Group, Groups, Object, Type, is_packed, packed_size};
 use canopen::sdo::Abort;
 use canopen::{Action, Job, NodeId};
 
@@ -281,7 +281,17 @@ fn the_size_of_a_packed_group_is_known() {
     for group in [Group::Communication, Group::Application] {
         let relative = if group == Group::Communication { 4 * (5 + 4) } else { 0 };
         let packed = packed(&bench, group);
-        assert_eq!(packed.len() + relative, canopen::dictionary::packed_size(&rows, group));
+        assert_eq!(packed.len() + relative, packed_size(&rows, group));
+    }
+    let first = [Object::new(0x2000, 0, "", Type::Unsigned8, Access::ReadWrite).stored(Group::Application)];
+    assert_eq!(packed_size(&first, Group::Application), 6, "the table begins with it");
+}
+
+#[test]
+fn a_packed_group_says_which_entries_it_has() {
+    let packed = packed(&Bench::booted(), Group::Communication);
+    for (sub, is_there) in [(0, false), (1, true), (4, true), (5, false)] {
+        assert_eq!(is_packed(&packed, 0x1016, sub), is_there, "{sub}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! One device type for two dictionaries, of which one has no EMCY (1014h) and no heartbeat.
 
-use canopen::dictionary::{Dictionary, Object, Sizes};
+use canopen::dictionary::{Dictionary, Object, Services, Sizes};
 use canopen::{Application, Condition, Device, Instant, NodeId, objects};
 
 use crate::types::Sent;
@@ -39,4 +39,22 @@ fn ids(dictionary: &'static Dictionary) -> Vec<u16> {
 fn a_dictionary_without_emcy_and_heartbeat_sends_none_in_a_device_with_room_for_them() {
     assert_eq!(ids(&DICTIONARIES[0]), [0x705, 0x085, 0x705, 0x705]);
     assert_eq!(ids(&DICTIONARIES[1]), [0x705]);
+}
+
+#[test]
+fn a_device_has_room_for_a_table_that_is_larger_in_nothing() {
+    let room = Sizes::of(FULL);
+    assert!(room.fits(room) && Sizes::of(BARE).fits(room) && !room.fits(Sizes::of(BARE)));
+    let larger = [
+        Sizes { image: room.image + 1, ..room },
+        Sizes { tpdos: room.tpdos + 1, ..room },
+        Sizes { rpdos: room.rpdos + 1, ..room },
+        Sizes { watches: room.watches + 1, ..room },
+        Sizes { scanned: room.scanned + 1, ..room },
+        Sizes { servers: room.servers + 1, ..room },
+        Sizes { services: room.services.with(Services::SDO_CLIENT), ..room },
+    ];
+    for larger in larger {
+        assert!(!larger.fits(room) && room.fits(larger), "{larger:?}");
+    }
 }
