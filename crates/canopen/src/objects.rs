@@ -60,11 +60,6 @@ const fn list<const N: usize>(number: Object, entry: Object) -> [Object; N] {
     let mut sub = 1;
     while sub < N {
         rows[sub].sub = sub as u8;
-        // A rule may depend on the sub-index.
-        rows[sub] = Object {
-            rule: Object::new(entry.index, sub as u8, "", entry.kind, entry.access).rule,
-            ..rows[sub]
-        };
         sub += 1;
     }
     rows

@@ -69,7 +69,7 @@ impl Budget {
 
     /// Sets the bit rate of the bus. At an unknown rate (0) nothing is limited.
     pub(crate) fn set_bit_rate(&mut self, kbit: u16) {
-        *self = Budget { refilled: self.refilled, ..Budget::new(kbit) };
+        *self = Budget::new(kbit);
     }
 
     /// A call of the device begins. `is_waiting`: whether a PDO that was queued before waits for the bus.

@@ -163,6 +163,9 @@ fn an_answer_for_another_object_ends_nothing() {
         let mut download = Download::new(NODE, OBJECT, data, once());
         assert_eq!(run(&mut download, &mut wrong).0, Err(Error::Unexpected), "{data:?}");
     }
+    let mut wrong = |_: [u8; 8]| vec![Response::BlockDownload(other, BlockSize::MAX).encode()];
+    let mut download = BlockDownload::new(NODE, OBJECT, &[0; 9], once());
+    assert_eq!(run(&mut download, &mut wrong).0, Err(Error::Unexpected), "in blocks");
 }
 
 /// A server without block transfers may name the object of the previous transfer.

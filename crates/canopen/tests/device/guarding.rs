@@ -108,6 +108,30 @@ fn a_missing_master_is_an_error_until_the_next_remote_frame() {
     assert_eq!(next.services, Instant::NEVER, "life guarding is off");
 }
 
+const fn guarded() -> [Object; 2] {
+    let [time, factor] = objects::node_guarding();
+    [time.value(100), factor.value(3)]
+}
+
+const GUARDED: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register()],
+    guarded(),
+    objects::identity(0, 1, 1),
+);
+
+#[test]
+fn life_guarding_has_its_stored_times_after_a_start() {
+    static DICTIONARY: Dictionary = canopen::dictionary!(GUARDED);
+    let mut sent = Sent::default();
+    let mut node: canopen::device!(Log, GUARDED) = Device::new(&DICTIONARY, NodeId::new(ID), Log::default());
+    let _ = node.start(Instant(0), &mut sent);
+    let _ = node.on_frame(&Frame::remote(0x705, 1).unwrap(), Instant(1_000_000), &mut sent);
+    let _ = node.poll(Instant(1_299_999), &mut sent);
+    assert_eq!(node.application().faults, []);
+    let _ = node.poll(Instant(1_300_000), &mut sent);
+    assert_eq!(node.application().faults, [(Fault::LifeGuard, true)]);
+}
+
 #[test]
 fn the_application_gets_the_states_of_monitored_nodes() {
     let mut node = node();

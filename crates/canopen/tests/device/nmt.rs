@@ -1,9 +1,12 @@
 //! NMT: commands, the services of each state, boot-up, start-up and error behaviour.
 
 use crate::bench::{Bench, DEVICE_FAULT, DICTIONARY, ID, SENSOR_BREAK, UNEXPECTED_RESET};
+use crate::service_device::Loader;
+use crate::types::Sent;
+use canopen::dictionary::{Access, Dictionary, Object, Type};
 use canopen::lss::{BitRate, Request};
 use canopen::nmt::State;
-use canopen::{Action, BusEvent, Duration, ErrorClass, Frame, NodeId};
+use canopen::{Action, BusEvent, Device, Duration, ErrorClass, Frame, Instant, NodeId, objects};
 
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -432,4 +435,34 @@ fn a_start_without_a_node_id_forgets_the_boot_up_message() {
     bench.out.room = 10;
     bench.run(Duration::from_millis(5000));
     assert_eq!(bench.sent(), []);
+}
+
+/// CiA 301, 7.3.2.2.1: the parameters of the communication profile area are set to their power-on values.
+#[test]
+fn a_reset_of_the_communication_keeps_the_objects_from_2000h_on() {
+    const AREAS: [u16; 3] = [0x1FFF, 0x2000, 0x6000];
+    const fn value(index: u16) -> Object {
+        Object::new(index, 0, "", Type::Unsigned8, Access::ReadWrite)
+    }
+    const ROWS: &[Object] = canopen::rows!(
+        [objects::device_type(0), objects::error_register()],
+        objects::identity(0, 1, 1),
+        [value(AREAS[0]), value(AREAS[1]), value(AREAS[2])],
+    );
+    static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+    let mut sent = Sent::default();
+    let mut node: canopen::device!(Loader, ROWS) =
+        Device::new(&DICTIONARY, NodeId::new(ID), Loader::default());
+    let _ = node.start(Instant(0), &mut sent);
+    for (command, expected) in [(RESET_COMMUNICATION, [0, 7, 7]), (RESET_NODE, [0; 3])] {
+        for index in AREAS {
+            let [low, high] = index.to_le_bytes();
+            let write = Frame::new(0x600 + u16::from(ID), &[0x2F, low, high, 0, 7, 0, 0, 0]).unwrap();
+            let _ = node.on_frame(&write, Instant(1), &mut sent);
+        }
+        let _ = node.on_frame(&Frame::new(0, &[command, ID]).unwrap(), Instant(2), &mut sent);
+        let _ = node.start(Instant(3), &mut sent);
+        let values = AREAS.map(|index| DICTIONARY.field(index, 0).u8(node.image()));
+        assert_eq!(values, expected, "{command:X}h");
+    }
 }

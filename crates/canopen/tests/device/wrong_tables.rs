@@ -103,6 +103,7 @@ fn a_pdo_has_all_its_rows() {
     let rows = objects::tpdo(1, &[INPUT]);
     let all = |missing: usize| [&rows[..missing], &rows[missing + 1..], &[INPUT]].concat();
     assert_error(&[&all(1)], "1800h:1: the PDO has no COB-ID");
+    assert_error(&[&rows[..1]], "1800h:1: the PDO has no COB-ID");
     assert_error(&[&all(2)], "1800h:2: the PDO has no transmission type");
     assert_error(&[&all(7)], "1A00h:1: the PDO maps more objects than it has entries");
     assert_error(&[&rows[..6]], "1A00h:0: the PDO has no mapping parameter");
