@@ -62,6 +62,9 @@ pub(crate) struct Flags {
     /// Run one of several parts of each crate: `0/8` is the first of eight
     #[arg(long, value_name = "PART/PARTS")]
     shard: Option<String>,
+    /// Build and test this many mutants at a time
+    #[arg(long, default_value_t = 1)]
+    jobs: u8,
 }
 
 /// Prints the mutants that no test notices; the logs are in target/mutants. Fails when there is one.
@@ -86,6 +89,6 @@ fn command(of: &Mutated, flags: &Flags, logs: &Path) -> Command {
     if let Some(shard) = &flags.shard {
         command.args(["--sharding", "round-robin", "--shard", shard]);
     }
-    command.env("RUST_BACKTRACE", "0").envs(PROPTEST);
+    command.arg(format!("--jobs={}", flags.jobs)).env("RUST_BACKTRACE", "0").envs(PROPTEST);
     command
 }

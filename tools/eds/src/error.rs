@@ -34,7 +34,7 @@ pub enum Problem {
         expected: String,
     },
     /// A value that is not of its type, and of which no part can be read.
-    #[error("\"{text}\" is not {expected}; the value is left out")]
+    #[error("\"{text}\" is not {expected}, and is not read")]
     NoValue {
         /// The value.
         text: String,

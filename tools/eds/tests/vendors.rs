@@ -143,7 +143,7 @@ fn values_are_checked_against_their_type() {
     let error = object("ParameterName=X\nDataType=5\nAccessType=rw\nDefaultValue=256\n");
     assert_eq!(
         error.to_string(),
-        "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8, 0 to 255; the value is left out"
+        "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8, 0 to 255, and is not read"
     );
     let error = object("ParameterName=X\nDataType=5\nAccessType=wr\n");
     assert!(error.to_string().ends_with("\"wr\" is not one of ro, wo, rw, rwr, rww and const"), "{error}");
@@ -157,7 +157,7 @@ fn a_compact_value_is_checked_in_its_own_section() {
     let error = object(lines);
     assert_eq!(
         error.to_string(),
-        "line 8: [2001value]: \"300\" is not a value of UNSIGNED8, 0 to 255; the value is left out"
+        "line 8: [2001value]: \"300\" is not a value of UNSIGNED8, 0 to 255, and is not read"
     );
 }
 
@@ -204,7 +204,7 @@ fn an_entry_whose_value_cannot_be_read_has_no_value() {
         let entry = get(&eds, 0x2001, 0);
         assert_eq!(entry.value.clone().or(entry.default.clone()), value, "{line}");
         let words = format!(
-            "line 6: [2001] ParameterValue: \"{line}\" is not a value of UNSIGNED16, 0 to 65535; the value is left out"
+            "line 6: [2001] ParameterValue: \"{line}\" is not a value of UNSIGNED16, 0 to 65535, and is not read"
         );
         let warnings: Vec<String> = eds.warnings.iter().map(ToString::to_string).collect();
         assert_eq!(warnings, value.map_or(vec![words], |_| Vec::new()));

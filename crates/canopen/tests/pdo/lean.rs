@@ -74,6 +74,14 @@ fn the_rows_decide_on_the_services() {
     assert_eq!(other, expected);
 }
 
+#[test]
+fn a_constant_number_of_mapped_objects_may_be_that_of_a_multiplexed_pdo() {
+    for (count, scanned) in [(0xFD, 0), (0xFE, 1), (0xFF, 1)] {
+        let number = Object::new(0x1A00, 0, "", Type::Unsigned8, Access::ReadOnly).value(count);
+        assert_eq!(Sizes::of(&[number, INPUT]).scanned, scanned, "{count}");
+    }
+}
+
 /// PDOs of one direction are enough for the rules of their objects.
 #[test]
 fn pdos_of_one_direction_have_the_interlocks_of_their_objects() {

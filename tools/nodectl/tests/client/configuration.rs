@@ -110,8 +110,7 @@ fn a_damaged_file_is_not_applied() {
     printed(&wire, &["write", "1017", "1000"]);
     let cut = whole.split_once("[6124]").expect("6124h").0.to_owned();
     let wrong = whole.replace("ParameterValue=250\r\n", "ParameterValue=-5\r\n");
-    let expected =
-        "[1017] ParameterValue: \"-5\" is not a value of UNSIGNED16, 0 to 65535; the value is left out";
+    let expected = "[1017] ParameterValue: \"-5\" is not a value of UNSIGNED16, 0 to 65535, and is not read";
     for (damaged, words) in [(cut, "6124h is listed and has no section"), (wrong, expected)] {
         std::fs::write(&file, &damaged).expect("a file");
         for line in [&["apply", &file][..], &["apply", &file, "--dry-run"]] {
