@@ -1,10 +1,10 @@
 //! Node-ID and bit rate of the node: from the note of the last start in RAM, otherwise from the device record. The
 //! product code follows from the personality in the device record.
 
-use bsp::bit_timing::BitTiming;
-use bsp::factory;
-use bsp::handover::Handover;
-use bsp::memory::{PARAMETER_PAGE, parameter_pages};
+use bsp::can::bit_timing::BitTiming;
+use bsp::chip::factory;
+use bsp::chip::handover::Handover;
+use bsp::chip::memory::{PARAMETER_PAGE, parameter_pages};
 use canopen::NodeId;
 use storage::{DeviceRecord, Memory, Pages};
 

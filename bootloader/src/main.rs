@@ -28,10 +28,11 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 
 #[rtic::app(device = bsp::pac, peripherals = true)]
 mod app {
-    use bsp::filters::Fifo;
-    use bsp::loader::Loader;
+    use bsp::can::filters::Fifo;
+    use bsp::chip::application;
     use bsp::losses::Losses;
-    use bsp::{ReceiveQueue, Receiver, TaskEnd, TimeInterrupt, application};
+    use bsp::start::loader::Loader;
+    use bsp::{ReceiveQueue, Receiver, TaskEnd, TimeInterrupt};
 
     use crate::identity::Identity;
     use crate::outbox::Outbox;

@@ -1,7 +1,8 @@
 //! The program on the bus: effects of a master's commands, and values of the objects of CiA 302-3.
 
+use bsp::ProgramFlash;
 use bsp::boards::BOARD;
-use bsp::{ProgramFlash, retained};
+use bsp::chip::retained;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};

@@ -1,7 +1,7 @@
 //! The main loop of the bootloader.
 
-use bsp::led::Led;
-use bsp::transmit_queue::Mailboxes;
+use bsp::can::transmit_queue::Mailboxes;
+use bsp::pins::led::Led;
 use bsp::{Alarm, Clock, Frames, StartUpWatchdog, Transmitter};
 use canopen::{Duration, Instant};
 use cortex_m::peripheral::SCB;

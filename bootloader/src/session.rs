@@ -1,13 +1,14 @@
 //! The bootloader on the bus: the CANopen device, the update, and the actions between them.
 
-use bsp::back_off::BackOff;
-use bsp::bit_rate_detection::{Heard, Step};
-use bsp::bit_timing::BitTiming;
-use bsp::bus_state::BusState;
 use bsp::can::Controller;
-use bsp::filters::{Bank, Fifo, Pair};
-use bsp::handover::Handover;
-use bsp::{Clock, Received, retained};
+use bsp::can::bit_timing::BitTiming;
+use bsp::can::bus_state::{BusState, Heard};
+use bsp::can::filters::{Bank, Fifo, Pair};
+use bsp::chip::handover::Handover;
+use bsp::chip::retained;
+use bsp::policy::back_off::BackOff;
+use bsp::policy::bit_rate_detection::Step;
+use bsp::{Clock, Received};
 use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
 use update::{Authorisation, Crashes, Decision, Next, Phase, Proof, Start, Updater};
 

@@ -1,9 +1,9 @@
 //! The decision at every start: the application, or the bus.
 
-use bsp::handover::Handover;
-use bsp::loader::Loader;
-use bsp::vectors::Vectors;
-use bsp::{application, factory, memory, retained};
+use bsp::chip::handover::Handover;
+use bsp::chip::vectors::Vectors;
+use bsp::chip::{application, factory, memory, retained};
+use bsp::start::loader::Loader;
 use update::key::KEY_LEN;
 use update::{AUTHORISATION_KEY, Authorisation, Decision, Pair, Reset, Start, Status, Stay};
 

@@ -1,6 +1,6 @@
 //! Properties of this node for the check of images.
 
-use bsp::update_layout::LAYOUT;
+use bsp::flash::update_layout::LAYOUT;
 use update::Target;
 use update::key::{HAS_PUBLISHED_KEY, PUBLIC_KEYS};
 

@@ -1,8 +1,9 @@
-//! The node as a guest on the bus: see [`bsp::guest`]. Until the guest stays, received frames are used for the bit rate
+//! The node as a guest on the bus: see [`bsp::policy::guest`]. Until the guest stays, received frames are used for the bit rate
 //! only.
 
-use bsp::bit_rate_detection::{Heard, Step};
-use bsp::guest::Guest;
+use bsp::can::bus_state::Heard;
+use bsp::policy::bit_rate_detection::Step;
+use bsp::policy::guest::Guest;
 use bsp::{Clock, Frames};
 use canopen::{Duration, Instant};
 

@@ -1,10 +1,11 @@
-//! The bit rate of the node: the stored one, or one that is detected by listening as a guest (`bsp::guest`).
+//! The bit rate of the node: the stored one, or one that is detected by listening as a guest (`bsp::policy::guest`).
 
 use bsp::Frames;
-use bsp::bit_rate_detection::{Heard, Step};
-use bsp::bit_timing::BitTiming;
 use bsp::can::Controller;
-use bsp::guest::Guest;
+use bsp::can::bit_timing::BitTiming;
+use bsp::can::bus_state::Heard;
+use bsp::policy::bit_rate_detection::Step;
+use bsp::policy::guest::Guest;
 use canopen::Instant;
 use node::BitRate;
 

@@ -1,6 +1,6 @@
 //! Events of the protocol for changes of the bus state.
 
-use bsp::bus_state::BusState;
+use bsp::can::bus_state::BusState;
 use node::BusEvent;
 
 /// The event for a change, if there is one; also written to the log.

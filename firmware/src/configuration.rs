@@ -3,9 +3,11 @@
 use core::mem::MaybeUninit;
 
 use bsp::boards::BOARD;
-use bsp::reset_cause::ResetCause;
-use bsp::update_layout::LAYOUT;
-use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
+use bsp::chip::{crash, factory, memory, retained};
+use bsp::flash::update_layout::LAYOUT;
+use bsp::power::reset_cause::ResetCause;
+use bsp::start::board;
+use bsp::{ParameterFlash, Sums};
 use node::{
     BitRate, EraseBudget, Fault, Identity, MemoryState, NodeId, ParameterMemory, Parameters, Personality,
     Protocol, Setup, StoredPositionRecord,

@@ -44,7 +44,7 @@ const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
-    bsp::crash::panicked(info.location())
+    bsp::chip::crash::panicked(info.location())
 }
 
 defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
@@ -53,11 +53,11 @@ defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
 mod app {
     use core::mem::MaybeUninit;
 
-    use bsp::filters::Fifo;
+    use bsp::can::filters::Fifo;
+    use bsp::can::transmit_queue::TransmitQueue;
     use bsp::losses::Losses;
-    use bsp::reset_cause::ResetCause;
-    use bsp::supervision::Part;
-    use bsp::transmit_queue::TransmitQueue;
+    use bsp::policy::supervision::Part;
+    use bsp::power::reset_cause::ResetCause;
     use bsp::{
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TaskEnd,
         TimeInterrupt, Transmitter, Watchdog,

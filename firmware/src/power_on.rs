@@ -2,9 +2,9 @@
 
 use core::mem::MaybeUninit;
 
-use bsp::backup_copies::BackupState;
-use bsp::battery::Battery;
-use bsp::reset_cause::ResetCause;
+use bsp::power::backup_copies::BackupState;
+use bsp::power::battery::Battery;
+use bsp::power::reset_cause::ResetCause;
 use node::{Measurement, Personality};
 use profiles::board::{POSITION_RECORD_WORDS, PowerOn, Retained};
 

@@ -1,15 +1,16 @@
 //! Services: frames of FIFO 1, heartbeat, SDO and EMCY, errors of the bus, and actions that the protocol leaves to the
 //! firmware.
 
-use bsp::back_off::BackOff;
-use bsp::bus_state::{BusState, BusWatch};
 use bsp::can::Controller;
-use bsp::filters::{self, Banks};
-use bsp::handover::Handover;
-use bsp::led::{Indicators, Led};
+use bsp::can::bus_state::{BusState, BusWatch};
+use bsp::can::filters::{self, Banks};
+use bsp::can::transmit_queue::TransmitQueue;
+use bsp::chip::handover::Handover;
+use bsp::chip::retained;
 use bsp::losses::{EVENTS, Event, Losses};
-use bsp::transmit_queue::TransmitQueue;
-use bsp::{Alarm, Clock, Frames, retained};
+use bsp::pins::led::{Indicators, Led};
+use bsp::policy::back_off::BackOff;
+use bsp::{Alarm, Clock, Frames};
 use canopen::indicators::{self, BusHealth};
 use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
@@ -198,7 +199,7 @@ impl Services {
     fn receive(&mut self, node: &mut impl Shared) {
         while let Some(received) = self.frames.dequeue() {
             let next = self.call(node, |protocol, out| {
-                protocol.self_test(bsp::self_test::value);
+                protocol.self_test(bsp::start::self_test::value);
                 protocol.on_service_frame(&received.frame, received.at, out)
             });
             let _ = self.settle(next, node);
@@ -207,7 +208,7 @@ impl Services {
 
     fn report_bus(&mut self, node: &mut impl Shared) {
         let now = Clock::now();
-        bsp::self_test::note_bus();
+        bsp::start::self_test::note_bus();
         let state = self.can.state();
         if state == BusState::Off {
             self.back_off.bus_off(now);

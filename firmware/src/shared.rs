@@ -1,6 +1,6 @@
 //! The protocol and the transmit queue, shared by process data and services.
 
-use bsp::transmit_queue::TransmitQueue;
+use bsp::can::transmit_queue::TransmitQueue;
 use node::Protocol;
 use rtic::mutex_prelude::*;
 

@@ -2,8 +2,9 @@
 //! stops the core for 16 us with every word, so all other tasks run between two words. The erase of a page stops the core
 //! for 0.25 s, so a page is erased only while that disturbs no service.
 
-use bsp::update_layout::LAYOUT;
-use bsp::{Clock, ParameterFlash, Watchdog, retained};
+use bsp::chip::retained;
+use bsp::flash::update_layout::LAYOUT;
+use bsp::{Clock, ParameterFlash, Watchdog};
 use canopen::sdo::Abort;
 use canopen::{Duration, Instant};
 use node::{MemoryState, ParameterMemory, StoreJob, StoredPositionRecord, Verdict, log_event, stored_log};

@@ -1,6 +1,6 @@
 //! The counters of a board's machine as figures for the summary.
 
-use bsp::vectors::UNUSED_STACK;
+use bsp::chip::vectors::UNUSED_STACK;
 use canbus::Time;
 use chip::Stm32f4;
 use emulator::{Exception, Incident, Machine};

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use bsp::transmit_queue::{Mailboxes, Offer, TransmitQueue};
+use bsp::can::transmit_queue::{Mailboxes, Offer, TransmitQueue};
 use canbus::{Attachment, BitTiming, Confinement, Controller, ErrorReport, ErrorState, Id, StandardId, Time};
 use canopen::{Frame, QueueFull, Transmit};
 

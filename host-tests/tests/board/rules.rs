@@ -32,7 +32,7 @@ fn a_broken_rule_is_reported_with_its_place_in_the_source() {
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| world.run_until(SECOND + SECOND)));
     let message = *outcome.unwrap_err().downcast::<String>().unwrap();
     assert!(message.contains("0 wait states of the flash at 144000000 Hz; it needs 4"), "{message}");
-    assert!(message.contains("crates/bsp/src/hardware/clock_tree.rs:"), "the program's own line: {message}");
+    assert!(message.contains("crates/bsp/src/start/clock_tree.rs:"), "the program's own line: {message}");
     let summary = world.summary(1.0, 0);
     assert!(summary.has_broken_rules() && summary.nodes[0].broken_rules.len() == 1, "{summary}");
 }

@@ -161,9 +161,13 @@ fn the_watchdog_keeps_its_time_out_with_every_oscillator_and_after_an_erase() {
 /// condition compares the time.
 #[test]
 fn no_wait_for_a_register_is_without_a_bound() {
-    let sources = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/bsp/src/hardware");
+    let folder = |path: &Path| -> Vec<PathBuf> {
+        std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect()
+    };
+    let sources = folder(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/bsp/src")));
+    let files = sources.iter().flat_map(|path| if path.is_dir() { folder(path) } else { vec![path.clone()] });
     let mut unbounded = Vec::new();
-    for file in std::fs::read_dir(sources).unwrap().map(|file| file.unwrap().path()) {
+    for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         for (number, line) in (1..).zip(&lines) {

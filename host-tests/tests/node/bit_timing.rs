@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use bsp::bit_timing::BitTiming as Node;
+use bsp::can::bit_timing::BitTiming as Node;
 use canbus::{BitTiming, Bus, Controller, Event, Fault, Frame, HostNode, Position, SeenBy, StandardId, Time};
 
 const BIT_RATES: [u16; 8] = [1000, 800, 500, 250, 125, 50, 20, 10];

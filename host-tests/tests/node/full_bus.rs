@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use bsp::transmit_queue::TransmitQueue;
+use bsp::can::transmit_queue::TransmitQueue;
 use canopen::lss::Identity;
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, NodeId};

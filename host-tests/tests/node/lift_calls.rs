@@ -2,7 +2,7 @@
 //! occupy for seconds, and bus-off in between. Every transition of a button reaches the bus once and in order, or is
 //! covered by a later full state.
 
-use bsp::transmit_queue::{Mailboxes, Offer, TransmitQueue};
+use bsp::can::transmit_queue::{Mailboxes, Offer, TransmitQueue};
 use canopen::{Duration, Frame, Instant};
 use fastrand::Rng;
 use host_tests::bench::{Bench, ID, raw};

@@ -93,7 +93,7 @@ fn the_regions_of_the_flash_do_not_overlap() {
 fn staging_and_the_kept_image_have_room_for_any_image_of_the_application_area_beside_their_records() {
     let regions = regions();
     let image = regions["IMAGE_HEADER"].len() + regions["APPLICATION"].len();
-    assert_eq!(bsp::update_layout::LAYOUT.longest_image() as usize, image);
+    assert_eq!(bsp::flash::update_layout::LAYOUT.longest_image() as usize, image);
     assert!(["STAGING", "KEPT"].iter().all(|name| regions[*name].len() >= image + 512));
 }
 
@@ -101,7 +101,7 @@ fn staging_and_the_kept_image_have_room_for_any_image_of_the_application_area_be
 #[test]
 fn the_update_knows_the_areas_and_their_sectors() {
     let regions = regions();
-    let layout = bsp::update_layout::LAYOUT;
+    let layout = bsp::flash::update_layout::LAYOUT;
     assert_eq!(regions["IMAGE_HEADER"].len(), update::HEADER_LEN);
     for (area, region) in [
         (layout.security(), regions["SECURITY"].clone()),

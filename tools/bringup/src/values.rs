@@ -1,4 +1,4 @@
-//! The numbers of the values in 2005h (crates/bsp/src/hardware/self_test.rs), and its commands.
+//! The numbers of the values in 2005h (crates/bsp/src/start/self_test.rs), and its commands.
 
 /// The upper bytes of what selects a value: "tes".
 const KEY: u32 = 0x0074_6573 << 8;

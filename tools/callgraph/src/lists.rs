@@ -22,7 +22,7 @@ pub(crate) const WIDTH: usize = 4;
 
 /// Functions that jump to an address that is no constant, and why the stack behind the jump does not count.
 const LEAVES: [(&str, &str); 1] =
-    [("bsp::hardware::application::start", "the bootloader starts the application, with a stack of its own")];
+    [("bsp::chip::application::start", "the bootloader starts the application, with a stack of its own")];
 
 /// Whether a function jumps out of the image, so that the call graph ends there.
 pub(crate) fn leaves_the_image(name: &str) -> bool {

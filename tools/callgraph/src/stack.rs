@@ -12,7 +12,7 @@ use crate::image::Image;
 /// Bytes that the core pushes at an exception: 26 words with the floating-point registers, and one to align the stack
 /// (PM0214, 2.3.7).
 const EXCEPTION: u32 = 4 * 26 + 4;
-/// A handler that does not count, because it has a stack of its own (`bsp::hardware::fault`).
+/// A handler that does not count, because it has a stack of its own (`bsp::start::fault`).
 const HARD_FAULT: &str = "HardFault";
 /// RTIC's `main` masks the interrupts, runs `init` in this function, whose last act is to enable them, and calls `idle`
 /// (rtic-macros, codegen/main.rs).

@@ -1,6 +1,6 @@
 //! Tests that a node accepts the images that the tool signs.
 
-use bsp::update_layout::LAYOUT;
+use bsp::flash::update_layout::LAYOUT;
 use programmer::sign::image::Image;
 use programmer::sign::{code, key, key_list};
 use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_PUBLISHED_KEY, KeyList, PUBLIC_KEYS, Rank};

@@ -17,6 +17,9 @@ pub const ALL: [(&str, &Board); 3] = [
     ("black-f407ve", &black_f407ve::BOARD),
 ];
 
+/// Clock of APB1 on all boards, hence of bxCAN, in hertz.
+pub const APB1_HZ: u32 = 36_000_000;
+
 /// The board of this image.
 #[cfg(feature = "nucleo-f446re")]
 pub const BOARD: Board = nucleo_f446re::BOARD;

@@ -1,7 +1,7 @@
 //! Small applications that write a word to RAM from any entry point, and wait for the watchdog.
 
-use bsp::sectors::FLASH;
-use bsp::update_layout::LAYOUT;
+use bsp::flash::sectors::FLASH;
+use bsp::flash::update_layout::LAYOUT;
 use update::HEADER_LEN;
 
 /// Address of the word: the far end of the stack, which the bootloader does not reach.

@@ -4,7 +4,7 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
-use bsp::crash_record::{Crash, Sealed, WORDS};
+use bsp::chip::crash_record::{Crash, Sealed, WORDS};
 use chip::{Peripherals, Stm32f4};
 use emulator::Machine;
 

@@ -3,8 +3,8 @@
 use std::sync::LazyLock;
 
 use anyhow::{Result, ensure};
-use bsp::sectors;
-use bsp::update_layout::LAYOUT;
+use bsp::flash::sectors;
+use bsp::flash::update_layout::LAYOUT;
 use ed25519_dalek::SigningKey;
 use programmer::sign::image::Image;
 use update::key::{Certificate, KeyList};

@@ -1,6 +1,6 @@
 //! A master that follows CiA 302-3, and its images.
 
-use bsp::update_layout::LAYOUT;
+use bsp::flash::update_layout::LAYOUT;
 use canbus::{StandardId, Time};
 use canopen::sdo::Multiplexer;
 use chip::Stm32f4;

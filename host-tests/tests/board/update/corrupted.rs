@@ -1,7 +1,7 @@
 //! Invalid images, each downloaded to the bootloader on the board. The table of crate `update` is longer (`cargo test
 //! -p update --test corrupted`); this one shows the same for the bus and the flash driver.
 
-use bsp::update_layout::LAYOUT;
+use bsp::flash::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
 use programmer::sign::image::Image;

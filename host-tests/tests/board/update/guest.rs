@@ -1,7 +1,7 @@
 //! Two boards and a master on one bus. One board is damaged while its power is off: its neighbour is not disturbed, and
 //! an update repairs the damaged board.
 
-use bsp::update_layout::LAYOUT;
+use bsp::flash::update_layout::LAYOUT;
 use canbus::Time;
 use host_tests::sdo::Failure;
 use host_tests::thorough::either;

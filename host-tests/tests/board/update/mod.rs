@@ -13,8 +13,8 @@ mod protected;
 mod records;
 mod trial;
 
-use bsp::sectors::FLASH;
-use bsp::update_layout::LAYOUT;
+use bsp::flash::sectors::FLASH;
+use bsp::flash::update_layout::LAYOUT;
 use callgraph::budget::{Budget, Compiler};
 use canbus::Time;
 use host_tests::thorough::either;

@@ -1,7 +1,7 @@
 //! Steps 8 to 11: the CAN controller and the bus.
 
 use anyhow::{Context, Result};
-use bsp::bit_timing::BitTiming;
+use bsp::can::bit_timing::BitTiming;
 use canopen::Duration;
 use canopen::lss::BitRate;
 use nodectl::lss::{Master, Selection};

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, ensure};
-use bsp::sectors::FLASH;
-use bsp::update_layout::LAYOUT;
+use bsp::flash::sectors::FLASH;
+use bsp::flash::update_layout::LAYOUT;
 use clap::Parser;
 use programmer::flash::Content;
 use programmer::flash::probe_rs::{self, Files};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail, ensure};
-use bsp::update_layout::LAYOUT;
+use bsp::flash::update_layout::LAYOUT;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use programmer::sign::product::{self, version};
 use programmer::sign::{code, image::Image, key, key_list};

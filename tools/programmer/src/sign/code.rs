@@ -1,8 +1,8 @@
 //! The code of an image, from an ELF file or a flat binary.
 
 use anyhow::{Context, Result, bail, ensure};
-use bsp::sectors::FLASH;
-use bsp::update_layout::LAYOUT;
+use bsp::flash::sectors::FLASH;
+use bsp::flash::update_layout::LAYOUT;
 use object::Endianness;
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Object, elf};
