@@ -1,7 +1,7 @@
 //! Properties of the chips that a model of registers alone would not show: pins, errata, a late clock, memory that
 //! decays. docs/evidence.md, Silicon, has the list.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use canbus::Time;
 use chip::Loss;

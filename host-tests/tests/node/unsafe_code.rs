@@ -1,5 +1,5 @@
-//! In flashed images, `unsafe` occurs only in the board support. Its modules without registers forbid it on the host. In the others
-//! clippy demands a reason for each block (`undocumented_unsafe_blocks`).
+//! In flashed images, `unsafe` occurs only in the board support. Its modules without registers forbid it on the host. In
+//! the others clippy demands a reason for each block (`undocumented_unsafe_blocks`).
 
 use std::fs;
 use std::path::{Path, PathBuf};
