@@ -1,10 +1,8 @@
 //! The application slot from the bootloader's side.
 #![expect(unsafe_code, reason = "memory by its address, and the jump to the application")]
 
-use crate::chip::confinement;
-use crate::chip::memory;
-use crate::chip::retained;
 use crate::chip::vectors::Vectors;
+use crate::chip::{confinement, memory, retained};
 
 /// The vectors of the application; `None` if the slot has nothing that could be started.
 pub fn vectors() -> Option<Vectors> {

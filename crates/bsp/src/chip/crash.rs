@@ -3,8 +3,7 @@
 use core::panic::Location;
 
 use crate::chip::crash_record::{Crash, Fault, Place, WORDS};
-use crate::chip::memory;
-use crate::chip::retained;
+use crate::chip::{memory, retained};
 
 /// Takes the crash that ended the last run; a second call returns none.
 pub fn take() -> Option<Crash> {

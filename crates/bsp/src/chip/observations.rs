@@ -1,6 +1,8 @@
 //! What the program has seen since its start, for the values of the board (2005h).
 
 use core::sync::atomic::AtomicU32;
+#[cfg(feature = "development")]
+use core::sync::atomic::Ordering;
 
 /// Observations of the program since its start. Written by one task each.
 pub(crate) static SEEN: Seen = Seen {
@@ -29,6 +31,6 @@ pub(crate) struct Seen {
 /// Takes note of the time of an erase.
 #[cfg(feature = "development")]
 pub(crate) fn note_erase(microseconds: u64) {
-    let longest = SEEN.longest_erase.load(core::sync::atomic::Ordering::Relaxed).max(microseconds as u32);
-    SEEN.longest_erase.store(longest, core::sync::atomic::Ordering::Relaxed);
+    let longest = SEEN.longest_erase.load(Ordering::Relaxed).max(microseconds as u32);
+    SEEN.longest_erase.store(longest, Ordering::Relaxed);
 }

@@ -25,8 +25,7 @@ use crate::position::ssi::{self, Ssi};
 use crate::power::backup::BackupMemory;
 use crate::power::backup_copies::BackupState;
 use crate::power::reset_cause::ResetCause;
-use crate::start::clock_tree;
-use crate::start::self_test;
+use crate::start::{clock_tree, self_test};
 use crate::time::time_base::{self, Alarm, TimeInterrupt};
 use crate::watchdog::StartUpWatchdog;
 

@@ -5,19 +5,16 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use update::Reset;
 
-use crate::ProgramFlash;
-use crate::StartUpWatchdog;
 use crate::can::controller::Controller;
 use crate::can::transmit::Transmitter;
-use crate::chip::confinement;
-use crate::chip::crash;
-use crate::chip::errata;
+use crate::chip::{confinement, crash, errata};
 use crate::flash::controller::Flash;
 use crate::losses::Losses;
 use crate::pins::led::Led;
 use crate::power::reset_cause::ResetCause;
 use crate::start::clock_tree;
 use crate::time::time_base::{self, Alarm, TimeInterrupt};
+use crate::{ProgramFlash, StartUpWatchdog};
 
 /// Clock, watchdog and flash.
 pub struct Loader {
