@@ -169,7 +169,7 @@ fn no_wait_for_a_register_is_without_a_bound() {
     let mut unbounded = Vec::new();
     for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
-        let lines: Vec<&str> = text.lines().collect();
+        let lines: Vec<&str> = text.lines().take_while(|line| *line != "#[cfg(test)]").collect();
         for (number, line) in (1..).zip(&lines) {
             let asks_register = line.trim_start().starts_with("while ") && line.contains("read()");
             let body =
