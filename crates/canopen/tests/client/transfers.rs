@@ -138,6 +138,24 @@ fn a_refusal_ends_a_transfer_at_once_and_is_not_answered() {
     assert_eq!(sent.len(), 1);
 }
 
+/// The server waits for a frame that was lost.
+#[test]
+fn a_time_out_of_the_server_is_tried_again() {
+    let mut server = Server::new(&[7; 20]);
+    let mut is_late = true;
+    let mut once_late = |request: [u8; 8]| {
+        // The first segment is lost.
+        if request[0] == 0x60 && std::mem::take(&mut is_late) {
+            return vec![Response::Abort(OBJECT, Abort::TimeOut.code()).encode()];
+        }
+        server.answer(request)
+    };
+    let options = Options { retries: 1, ..once() };
+    assert_eq!(upload(&mut once_late, options).1, [7; 20]);
+    let mut always_late = |_: [u8; 8]| vec![Response::Abort(OBJECT, Abort::TimeOut.code()).encode()];
+    assert_eq!(upload(&mut always_late, options).0, Err(Error::Abort(Abort::TimeOut.into())));
+}
+
 /// An abort message for another object belongs to an earlier transfer.
 #[test]
 fn a_late_abort_message_is_passed_over() {

@@ -41,9 +41,13 @@ impl Error {
         }
     }
 
-    /// Whether another attempt may succeed.
+    /// Whether another attempt may succeed: a frame was lost, or came twice.
     pub(super) fn is_worth_a_retry(self) -> bool {
-        matches!(self, Error::NoAnswer | Error::Unexpected)
+        match self {
+            Error::NoAnswer | Error::Unexpected => true,
+            Error::Abort(code) => code.is_time_out(),
+            _ => false,
+        }
     }
 }
 

@@ -14,7 +14,7 @@ pub struct Options {
     pub timeout: Duration,
     /// The longest time of a transfer, including retries.
     pub limit: Duration,
-    /// How often a transfer is restarted when an answer is missing or does not fit.
+    /// How often a transfer is restarted when an answer is missing or does not fit, or when the server misses a request.
     pub retries: u8,
     /// Segments in a block of a block upload, 1 to 127.
     pub block_size: BlockSize,
