@@ -64,7 +64,7 @@ fn a_node_whose_frames_wait_for_more_urgent_ones_is_not_lost() {
         let happens = move |world: &mut World| {
             if world.now() >= next && next < begin + SECOND * 10 {
                 (0..FRAMES).for_each(|_| urgent.send(world, MORE_URGENT, &[0x55; 8]));
-                next = next + PERIOD;
+                next += PERIOD;
             }
         };
         let reports = update_while(&world, &node.to_string(), &version_b(0), happens, &[]).unwrap();
