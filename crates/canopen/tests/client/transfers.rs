@@ -183,7 +183,12 @@ fn an_answer_for_another_object_ends_nothing() {
     }
     let mut wrong = |_: [u8; 8]| vec![Response::BlockDownload(other, BlockSize::MAX).encode()];
     let mut download = BlockDownload::new(NODE, OBJECT, &[0; 9], once());
-    assert_eq!(run(&mut download, &mut wrong).0, Err(Error::Unexpected), "in blocks");
+    let (outcome, _, sent) = run(&mut download, &mut wrong);
+    assert_eq!(
+        (outcome, sent.len()),
+        (Err(Error::Unexpected), 2),
+        "the request and the abort message, no segment"
+    );
 }
 
 /// A server without block transfers may name the object of the previous transfer.
