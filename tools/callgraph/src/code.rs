@@ -232,7 +232,7 @@ impl Reader<'_> {
     }
 
     fn leave(&mut self, at: u32, to: u32) -> Result<()> {
-        let other = self.image.function_at(to).with_context(|| format!("{to:#010x} is in no function"))?;
+        let other = self.image.entered(to)?;
         if other.start != self.function.start {
             self.body.ways.push(Way { at, to: other.start, registers: self.registers.clone() });
         }

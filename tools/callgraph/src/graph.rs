@@ -51,8 +51,7 @@ impl Graph {
             let constant = caller.registers.constant(branch.register);
             let to =
                 constant.with_context(|| format!("the caller at {:#09x} holds no constant", caller.at))?;
-            let to = image.function_at(to).with_context(|| format!("{to:#010x} is in no function"))?;
-            Ok(Way { at: branch.at, to: to.start, registers: caller.registers.clone() })
+            Ok(Way { at: branch.at, to: image.entered(to)?.start, registers: caller.registers.clone() })
         });
         let ways: Vec<Way> = ways.collect::<Result<_>>()?;
         ensure!(!ways.is_empty(), "calls through a register that holds no constant, and has no caller");

@@ -102,6 +102,11 @@ impl<'a> Image<'a> {
         (function.end > address & !THUMB).then_some(function)
     }
 
+    /// The function that a branch to this address enters.
+    pub(crate) fn entered(&self, address: u32) -> Result<&Function> {
+        self.function_at(address).with_context(|| format!("{address:#010x} is in no function"))
+    }
+
     /// The function of this name.
     pub(crate) fn function(&self, name: &str) -> Result<&Function> {
         let found = self.symbols.get(name).and_then(|(address, _)| self.function_at(*address));

@@ -1,7 +1,7 @@
 //! Memory protection unit (PM0214, 4.2) while the bootloader runs: only the bootloader's own code can be executed.
 //! Received data, and an application that is not verified yet, cannot be executed, even if the processor takes a wrong
 //! branch.
-#![expect(unsafe_code, reason = "REASON")]
+#![expect(unsafe_code, reason = "registers of the MPU")]
 
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::MPU;

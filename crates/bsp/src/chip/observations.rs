@@ -1,4 +1,4 @@
-//! What the program has seen since its start, for the values of the board (2005h).
+//! The observations of the program since its start, for the values of the board (2005h).
 
 use core::sync::atomic::AtomicU32;
 #[cfg(feature = "development")]

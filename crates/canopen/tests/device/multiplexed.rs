@@ -298,7 +298,7 @@ fn the_application_leaves_out_missing_objects() {
     assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]]);
 }
 
-/// Who listens may have lost the value meanwhile.
+/// A receiver may have lost the value meanwhile.
 #[test]
 fn an_object_that_is_selected_again_is_sent_with_the_value_it_had() {
     let mut bench = sender(DESTINATION);

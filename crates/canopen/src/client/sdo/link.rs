@@ -92,8 +92,8 @@ impl Link {
     /// wait still.
     pub(super) fn segment(&mut self, segment: BlockSegment, now: Instant) -> Frame {
         self.has_unexpected = false;
-        let sending = SEGMENT_TIME.0 * u64::from(segment.sequence.get());
-        self.answer_by = later(now + Duration(sending), self.options.timeout);
+        let sending = Duration(SEGMENT_TIME.0 * u64::from(segment.sequence.get()));
+        self.answer_by = later(later(now, sending), self.options.timeout);
         self.frame(segment.encode())
     }
 
