@@ -3,7 +3,7 @@
 use super::inner::Inner;
 use super::lss::LssSlave;
 use super::{Action, Application as _, Definition, Device, Next, STALE};
-use crate::array::Array;
+use crate::array::{Array, Element};
 use crate::dictionary::Services as Has;
 use crate::frame::FullFrameId;
 use crate::lss::{self, BitRate};
@@ -35,7 +35,7 @@ pub(super) struct Services<D: Definition> {
 impl<D: Definition> Services<D> {
     pub(super) fn new(node_id: Option<NodeId>) -> Services<D> {
         Services {
-            sdo: Channel::new(),
+            sdo: Channel::NEW,
             sdo_request: sdo_request(node_id),
             more_sdo: D::Servers::NEW,
             lss: LssSlave::new(node_id),

@@ -45,23 +45,24 @@ impl Queue {
 
 /// The active faults, their history and the waiting messages.
 #[derive(Debug)]
+#[repr(C)]
 pub(crate) struct Producer {
     /// Conditions of the application.
     conditions: &'static [Condition],
-    /// The bits of the error register that the device supports.
-    register_bits: u8,
     /// 1014h; `None` while bit 31 disables EMCY.
     id: Option<CobId>,
-    active: FaultSet,
-    history: History,
-    waiting: Queue,
+    /// The bits of the error register that the device supports.
+    register_bits: u8,
+    /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_error`].
+    errors: u8,
     /// 1015h, in 100 us.
     inhibit: u16,
+    active: FaultSet,
     /// When the last message was sent, or `NEVER`.
     sent_at: Tick,
     due: Tick,
-    /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_error`].
-    errors: u8,
+    waiting: Queue,
+    history: History,
 }
 
 impl Producer {

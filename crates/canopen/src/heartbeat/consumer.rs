@@ -42,13 +42,18 @@ pub struct Monitored {
     /// When the heartbeat is missing. `NEVER` until the first heartbeat, and while the heartbeat is lost.
     due: Tick,
     is_lost: bool,
-    /// The state in the last heartbeat; `None` before the first one, and while the heartbeat is lost.
-    state: Option<State>,
+    /// The code of the state in the last heartbeat, if one is not missing: `due`.
+    code: u8,
 }
 
 impl Monitored {
     const fn new(watch: Option<Watch>) -> Monitored {
-        Monitored { watch, due: Tick::NEVER, is_lost: false, state: None }
+        Monitored { watch, due: Tick::NEVER, is_lost: false, code: 0 }
+    }
+
+    /// The state in the last heartbeat; `None` before the first one, while the heartbeat is lost, and for a reserved code.
+    fn state(&self) -> Option<State> {
+        if self.due == Tick::NEVER { None } else { State::from_code(self.code) }
     }
 }
 
@@ -101,13 +106,12 @@ impl<E: Array<Monitored>> Consumer<E> {
         changed: impl FnOnce(NodeId, State),
     ) -> Option<Change> {
         let &[code] = frame.data() else { return None };
-        let state = State::from_code(code);
         for (number, entry) in (0..).zip(self.entries.as_mut()) {
             if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
-                entry.due = now.plus(Span::from_millis(watch.period));
-                let before = core::mem::replace(&mut entry.state, state);
-                if let Some(state) =
-                    state.filter(|state| before != Some(*state) || *state == State::Initialising)
+                let before = entry.state();
+                (entry.due, entry.code) = (now.plus(Span::from_millis(watch.period)), code);
+                if let Some(state) = entry.state()
+                    && (before != Some(state) || state == State::Initialising)
                 {
                     changed(watch.node, state);
                 }
@@ -120,7 +124,7 @@ impl<E: Array<Monitored>> Consumer<E> {
     /// The state of a monitored node; `None` before its first heartbeat, and while its heartbeat is lost.
     pub(crate) fn state(&self, node: NodeId) -> Option<State> {
         let mut entries = self.entries.as_ref().iter();
-        entries.find(|entry| entry.watch.is_some_and(|watch| watch.node == node))?.state
+        entries.find(|entry| entry.watch.is_some_and(|watch| watch.node == node))?.state()
     }
 
     /// The entries whose heartbeat is lost, from 0.
@@ -136,7 +140,7 @@ impl<E: Array<Monitored>> Consumer<E> {
     /// Reports one missing heartbeat. Must be called until the result is `None`.
     pub(crate) fn expire(&mut self, now: Tick) -> Option<Change> {
         let (number, entry) = (0..).zip(self.entries.as_mut()).find(|(_, entry)| now >= entry.due)?;
-        (entry.due, entry.is_lost, entry.state) = (Tick::NEVER, true, None);
+        (entry.due, entry.is_lost) = (Tick::NEVER, true);
         Some(Change::Lost(number))
     }
 }

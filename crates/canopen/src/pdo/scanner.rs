@@ -89,15 +89,16 @@ impl<L: Array<Watched>> List<L> {
 
 /// The producer of the multiplexed TPDO, with room for as many objects as `L` has elements. Without settings it sends nothing.
 #[derive(Debug)]
+#[repr(C)] // As for `Inner`.
 pub(crate) struct Scanner<L> {
     settings: Option<ScannerSettings>,
-    watched: List<L>,
     /// Whether any object waits to be sent.
     is_pending: bool,
     event_due: Tick,
     /// The last transmission since the last reset. No reconfiguration shortens the inhibit time.
     sent: Tick,
     inhibited_until: Tick,
+    watched: List<L>,
 }
 
 impl<L: Array<Watched>> Scanner<L> {

@@ -29,19 +29,22 @@ const REST_AFTER_TIME_OUT: Span = Span::from_millis(5000);
 const LOST_AFTER_TIME_OUT: u8 = 2;
 
 /// The state of the only SDO channel (1200h).
+// In this order, the arrays are one range of whole words, which one call sets to zero.
 #[derive(Debug)]
+#[repr(C)]
 pub(crate) struct Server<O> {
     transfer: Transfer,
     multiplexer: Multiplexer,
-    /// For an upload, a copy of the value; for a download, the data received so far.
-    buffer: [u8; BUFFER],
+    /// Whether `reply` answers the request `previous`.
+    is_answered: bool,
     /// The time of the last progress.
     active: Tick,
-    /// The last request that can be part of a series, and whether `reply` answers this request.
+    /// The last request that can be part of a series.
     previous: [u8; 8],
-    is_answered: bool,
     /// The frame of the last response.
     reply: [u8; 8],
+    /// For an upload, a copy of the value; for a download, the data received so far.
+    buffer: [u8; BUFFER],
     objects: PhantomData<fn(&O)>,
 }
 
@@ -69,18 +72,16 @@ enum Transfer {
 type Answer = Result<bool, Abort>;
 
 impl<O: Objects> Server<O> {
-    pub(crate) const fn new() -> Server<O> {
-        Server {
-            transfer: Transfer::Idle,
-            multiplexer: Multiplexer { index: 0, sub: 0 },
-            buffer: [0; BUFFER],
-            active: Tick::NEVER,
-            previous: [0; 8],
-            is_answered: false,
-            reply: [0; 8],
-            objects: PhantomData,
-        }
-    }
+    const NEW: Server<O> = Server {
+        transfer: Transfer::Idle,
+        multiplexer: Multiplexer { index: 0, sub: 0 },
+        is_answered: false,
+        active: Tick::NEVER,
+        previous: [0; 8],
+        reply: [0; 8],
+        buffer: [0; BUFFER],
+        objects: PhantomData,
+    };
 
     /// The epoch of the clock has moved.
     pub(crate) fn shift(&mut self, by: Span) {
@@ -377,14 +378,10 @@ impl<O> core::fmt::Debug for Channel<O> {
 }
 
 impl<O: Objects> Element for Channel<O> {
-    const NEW: Channel<O> = Channel::new();
+    const NEW: Channel<O> = Channel { server: Server::NEW, reply_due: Tick::NEVER, block_due: Tick::NEVER };
 }
 
 impl<O: Objects> Channel<O> {
-    pub(crate) const fn new() -> Channel<O> {
-        Channel { server: Server::new(), reply_due: Tick::NEVER, block_due: Tick::NEVER }
-    }
-
     /// Forgets the transfer without an abort message: the NMT state no longer allows SDO.
     pub(crate) fn forget(&mut self, objects: &mut O) {
         self.server.reset(objects);
