@@ -5,7 +5,7 @@ use bsp::boards::BOARD;
 use bsp::chip::retained;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Application, Part};
+use canopen::{Application, Part, Reset};
 use update::{AUTHORISATION_KEY, Authorisation, Proof, Refusal, Updater};
 
 use crate::dictionary::DICTIONARY;
@@ -121,7 +121,7 @@ impl Application for Program {
     /// Block upload is off: the longest readable value is a short text.
     const BLOCK_UPLOAD: bool = false;
 
-    fn initialise(&mut self, image: &mut [u8]) {
+    fn initialise(&mut self, _: Reset, image: &mut [u8]) {
         HARDWARE.set(image, BOARD.name.as_bytes());
         let identity =
             [profiles::product::VENDOR_ID, self.product, profiles::product::REVISION, self.serial_number];

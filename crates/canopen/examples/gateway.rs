@@ -36,7 +36,7 @@ use canopen::dictionary::{Access, Dictionary, Entry, Field, Mapping, Object, Typ
 use canopen::emcy::Message;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Application, Device, Fault, Frame, Instant, Next, NodeId, Transmit, objects};
+use canopen::{Application, Device, Fault, Frame, Instant, Next, NodeId, Reset, Transmit, objects};
 use socketcand::{Bus, Product};
 
 // ------------------------------------------------------------------------------------------------- object dictionary
@@ -104,7 +104,7 @@ impl Host {
 
 impl Application for Host {
     /// The EMCYs of all nodes are consumed.
-    fn initialise(&mut self, image: &mut [u8]) {
+    fn initialise(&mut self, _: Reset, image: &mut [u8]) {
         for node in 1..=127 {
             if let Ok(entry) = DICTIONARY.find(0x1028, node) {
                 entry.field().set_u32(image, 0x80 + u32::from(node));

@@ -36,7 +36,8 @@ mod transmit;
 
 pub use can_id::{CanId, CobId};
 pub use device::{
-    Action, Application, BusEvent, Damage, Definition, Device, Job, Next, ServiceDevice, Soundness, Stored,
+    Action, Application, BusEvent, Damage, Definition, Device, Job, Next, Reset, ServiceDevice, Soundness,
+    Stored,
 };
 pub use emcy::{Condition, ErrorClass, Fault};
 pub use frame::Frame;

@@ -4,7 +4,7 @@ use canopen::dictionary::{Entry, Group, Groups, is_packed};
 use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Application, Condition, ErrorClass, Part, Soundness};
+use canopen::{Application, Condition, ErrorClass, Part, Reset, Soundness};
 use profiles::communication::{
     LOST_EVENT_KINDS, PARAMETER_MEMORY, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL, UPDATE_LOG,
 };
@@ -121,7 +121,7 @@ impl Application for NodeApplication {
     }
 
     #[inline(never)]
-    fn initialise(&mut self, image: &mut [u8]) {
+    fn initialise(&mut self, reset: Reset, image: &mut [u8]) {
         let setup = &self.setup;
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
         show(0x1009, 0, setup.hardware_version.as_bytes());
@@ -134,11 +134,12 @@ impl Application for NodeApplication {
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
         show(0x1F57, 1, &status.to_le_bytes());
         self.adopt_older_choice(image);
-        let mut stored = Groups::NONE;
+        let mut defaults = Groups::NONE;
         for group in Group::COMMON {
-            stored.set(group, !self.stored.get(group).packed.is_empty());
+            let is_loaded = reset == Reset::Node || group == Group::Communication;
+            defaults.set(group, is_loaded && self.stored.get(group).packed.is_empty());
         }
-        self.profile.initialise(image, stored);
+        self.profile.initialise(image, defaults);
         self.show_personality(image);
         self.show_flags(image);
         self.show_lost_events(image);

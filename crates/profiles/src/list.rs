@@ -327,7 +327,7 @@ macro_rules! personalities {
             }
 
             $crate::forwards! { [$($Name)+]
-                fn initialise(&mut self, image: &mut [u8], stored: canopen::dictionary::Groups);
+                fn initialise(&mut self, image: &mut [u8], defaults: canopen::dictionary::Groups);
                 fn write(
                     &mut self,
                     entry: &canopen::dictionary::Entry,

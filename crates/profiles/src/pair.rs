@@ -57,9 +57,9 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         Pair(A::new(first), B::new(second))
     }
 
-    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
-        self.0.initialise(image, stored);
-        self.1.initialise(image, stored);
+    fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
+        self.0.initialise(image, defaults);
+        self.1.initialise(image, defaults);
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters<Self> {

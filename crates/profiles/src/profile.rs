@@ -56,8 +56,8 @@ pub trait Profile: Sized {
     fn new(fields: &'static Self::Fields) -> Self;
 
     /// Fills in the values that the table cannot have, after every reset: those that depend on the identity and on the
-    /// parameters. `stored`: the groups in the image that a client has stored, and that are no defaults.
-    fn initialise(&mut self, _image: &mut [u8], _stored: Groups) {}
+    /// parameters. `defaults`: the groups that the reset has given their defaults, not stored values.
+    fn initialise(&mut self, _image: &mut [u8], _defaults: Groups) {}
 
     /// The parameters in the image. An impossible value acts as a valid one.
     fn parameters(&self, image: &[u8]) -> Parameters<Self>;

@@ -26,6 +26,7 @@ mod personalities;
 mod pressure_node;
 mod program_gate;
 mod program_trial;
+mod resets;
 mod self_test;
 mod storing;
 mod stuck_client;

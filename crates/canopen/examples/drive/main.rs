@@ -22,7 +22,7 @@ use std::sync::mpsc::Receiver;
 
 use canopen::dictionary::Entry;
 use canopen::sdo::Abort;
-use canopen::{Application, Condition, Device, ErrorClass, Instant, Next};
+use canopen::{Application, Condition, Device, ErrorClass, Instant, Next, Reset};
 use machine::State;
 use motor::{Motor, Ramp};
 use objects::{DICTIONARY, ROWS, at};
@@ -176,7 +176,7 @@ impl Drive {
 impl Application for Drive {
     const CONDITIONS: &'static [Condition] = &[Condition::new(OVERCURRENT)];
 
-    fn initialise(&mut self, image: &mut [u8]) {
+    fn initialise(&mut self, _: Reset, image: &mut [u8]) {
         self.show(image);
     }
 

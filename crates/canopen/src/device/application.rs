@@ -1,6 +1,6 @@
 //! The interface between a device and the application code of the product.
 
-use super::{Soundness, Stored};
+use super::{Reset, Soundness, Stored};
 use crate::NodeId;
 use crate::dictionary::{Entry, Group, Groups};
 use crate::emcy::{Condition, ErrorClass, Fault, Message};
@@ -56,8 +56,10 @@ pub trait Application {
     }
 
     /// Sets values that the table of rows cannot contain (identity, versions, the last measured values). Called after
-    /// every reset.
-    fn initialise(&mut self, _image: &mut [u8]) {}
+    /// every reset. The device has given the objects of `reset` their stored values or defaults; after
+    /// [`Reset::Communication`], parameters of the application have the values that clients have written, and keep them
+    /// (CiA 301, 7.3.2.2.3).
+    fn initialise(&mut self, _reset: Reset, _image: &mut [u8]) {}
 
     /// Decides on a write to an entry that is [`handled`](crate::dictionary::Object::handled), by SDO or by an RPDO.
     /// Type and limits are checked already, and the device stores the bytes. The method may change other values.

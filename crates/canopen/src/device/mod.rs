@@ -35,6 +35,7 @@ pub use application::Application;
 pub use definition::{Definition, Rows};
 pub use faults::BusEvent;
 pub use next::{Action, Next};
+pub use state::Reset;
 pub use store::{Damage, Job, Soundness, Stored};
 
 use crate::dictionary::Dictionary;

@@ -14,8 +14,11 @@ pub(super) const SELF_START: u32 = 0x08;
 
 /// The part of the device that [`Device::start`] initialises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Reset {
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reset {
+    /// Reset communication: the communication objects.
     Communication,
+    /// Reset node, and the first start: all objects.
     Node,
 }
 
@@ -154,8 +157,9 @@ impl<D: Definition> Device<D> {
         if inner.is_initialising() {
             inner.node_id = self.services.lss.node_id();
         }
-        inner.load_values(inner.pending.reset == Reset::Node);
-        inner.application.initialise(inner.image.as_mut());
+        let reset = inner.pending.reset;
+        inner.load_values(reset == Reset::Node);
+        inner.application.initialise(reset, inner.image.as_mut());
         inner.pending.values_loaded();
     }
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use canopen::dictionary::{Entry, Group, Groups};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Application, Condition, ErrorClass, Fault, Part, Soundness, Stored};
+use canopen::{Application, Condition, ErrorClass, Fault, Part, Reset, Soundness, Stored};
 
 use crate::rows::DICTIONARY;
 
@@ -73,7 +73,7 @@ impl Application for Numbers {
         Condition::new(0x5003).of_class(ErrorClass::DEVICE),
     ];
 
-    fn initialise(&mut self, image: &mut [u8]) {
+    fn initialise(&mut self, _: Reset, image: &mut [u8]) {
         DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
     }
 

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use canopen::dictionary::{Dictionary, Entry, Group, Services, Sizes};
+use canopen::dictionary::{Dictionary, Entry, Group, Services, Sizes, is_packed};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{
-    Action, Application, Condition, Device, Frame, Instant, Job, Next, NodeId, Part, Soundness, Stored,
-    Transmit,
+    Action, Application, Condition, Device, Frame, Instant, Job, Next, NodeId, Part, Reset, Soundness,
+    Stored, Transmit,
 };
 
 use super::rows::Table;
@@ -82,8 +82,14 @@ impl App {
 impl Application for App {
     const CONDITIONS: &'static [Condition] = &CONDITIONS;
 
-    fn initialise(&mut self, image: &mut [u8]) {
-        self.values.iter().for_each(|(key, bytes)| self.set(*key, bytes, image));
+    /// Values that a client has stored, or that the reset leaves alone, stay.
+    fn initialise(&mut self, reset: Reset, image: &mut [u8]) {
+        let is_kept = |(index, sub)| {
+            reset == Reset::Communication && index >= 0x2000
+                || self.stored.iter().any(|packed| is_packed(packed, index, sub))
+        };
+        let values = self.values.iter().filter(|(key, _)| !is_kept(*key));
+        values.for_each(|(key, bytes)| self.set(*key, bytes, image));
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {

@@ -73,8 +73,8 @@ impl Profile for Objects {
         Objects { fields, reports: [Reports::default(); 2] }
     }
 
-    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
-        self.fields.initialise(image, stored.contains(Group::Communication));
+    fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
+        self.fields.initialise(image, defaults.contains(Group::Communication));
     }
 
     fn parameters(&self, image: &[u8]) -> Parameters {

@@ -235,12 +235,12 @@ impl Fields {
 
     /// Fills in the values that the table cannot have: the serial number (650Bh, hard-wired to 1018h:4), and the values
     /// that depend on the sensors in use. A stored mapping stays as the client has stored it.
-    pub(super) fn initialise(&self, image: &mut [u8], is_stored: bool) {
+    pub(super) fn initialise(&self, image: &mut [u8], has_default_mapping: bool) {
         let [source, shown] = self.serial_number;
         shown.store(image, source.load::<4>(image));
         let encoder_type = self.parameters(image).encoder_type();
         self.device_type.store(image, device_type(encoder_type).to_le_bytes());
-        if encoder_type == MULTI_SENSOR && !is_stored {
+        if encoder_type == MULTI_SENSOR && has_default_mapping {
             self.map_first_channel(image);
         }
     }

@@ -84,7 +84,7 @@ impl Profile for Objects {
         Objects { fields, calls: Calls::default(), lamps: panel::LampStates::default() }
     }
 
-    fn initialise(&mut self, image: &mut [u8], _stored: Groups) {
+    fn initialise(&mut self, image: &mut [u8], _defaults: Groups) {
         self.fields.initialise(image);
     }
 

@@ -83,8 +83,8 @@ impl Profile for Objects {
         Objects { fields, measured: [None; 2], states: States::default() }
     }
 
-    fn initialise(&mut self, image: &mut [u8], stored: Groups) {
-        if !stored.contains(Group::Application) {
+    fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
+        if defaults.contains(Group::Application) {
             self.fields.default_spans(image);
         }
     }

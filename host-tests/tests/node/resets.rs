@@ -1,0 +1,66 @@
+//! A reset of the communication leaves the objects from 2000h on alone (CiA 301, 7.3.2.2.3).
+
+use host_tests::bench::Bench;
+use node::Personality;
+
+const RESET_COMMUNICATION: u8 = 0x82;
+/// The event timer of the first TPDO (CiA 406), which is a communication object.
+const CYCLIC_TIMER: u16 = 0x6200;
+
+type Values = Vec<((u16, u8), Vec<u8>)>;
+
+/// Gives each object from 2000h on, except the personality, another value. Returns the values of those that take one.
+fn changed(bench: &mut Bench, personality: Personality) -> Values {
+    let entries = personality.dictionary().entries().map(|entry| (entry.index(), entry.sub()));
+    let objects = entries.filter(|(index, _)| *index > 0x2000 && *index != CYCLIC_TIMER);
+    let changed: Vec<_> = objects.filter(|at| takes_another_value(bench, *at)).collect();
+    assert!(changed.len() >= 5, "{changed:X?}");
+    changed.into_iter().map(|at| (at, bench.read(at.0, at.1).unwrap())).collect()
+}
+
+fn takes_another_value(bench: &mut Bench, (index, sub): (u16, u8)) -> bool {
+    let Ok(before) = bench.read(index, sub) else { return false };
+    let mut changes = (0..before.len()).flat_map(|place| [1, 2, 0x40].map(|flip| (place, flip)));
+    changes.any(|(place, flip)| {
+        let mut other = before.clone();
+        other[place] ^= flip;
+        bench.write(index, sub, &other).is_ok()
+    })
+}
+
+/// The objects that no longer have their values.
+fn lost(bench: &mut Bench, expected: &Values) -> Values {
+    expected.iter().filter(|(at, value)| bench.read(at.0, at.1).as_ref() != Ok(value)).cloned().collect()
+}
+
+fn reset_communication(bench: &mut Bench) {
+    bench.nmt(RESET_COMMUNICATION);
+    bench.restart();
+}
+
+#[test]
+fn a_reset_of_the_communication_keeps_every_object_from_2000h_on() {
+    for personality in Personality::ALL {
+        for id in [1, 16, 127] {
+            let mut bench = Bench::booted_at(personality, id);
+            let expected = changed(&mut bench, personality);
+            reset_communication(&mut bench);
+            assert_eq!(lost(&mut bench, &expected), [], "{personality:?} {id}, not saved");
+        }
+    }
+}
+
+/// The defaults of the application are in force after a reset of the node (CMP 8271, 1011h:3).
+#[test]
+fn parameters_to_be_restored_stay_until_the_node_is_reset() {
+    for personality in Personality::ALL {
+        for id in [1, 16, 127] {
+            let mut bench = Bench::booted_at(personality, id);
+            let expected = changed(&mut bench, personality);
+            bench.write(0x1010, 1, b"save").unwrap();
+            bench.write(0x1011, 3, b"load").unwrap();
+            reset_communication(&mut bench);
+            assert_eq!(lost(&mut bench, &expected), [], "{personality:?} {id}");
+        }
+    }
+}
