@@ -115,6 +115,7 @@ impl NodeApplication {
 impl Application for NodeApplication {
     const CONDITIONS: &'static [Condition] = &CONDITIONS;
     const SENDS_EVENTS: bool = true;
+    const THRESHOLDS: bool = true;
 
     fn register_bits(&self) -> u8 {
         self.profile.register_bits()
@@ -193,8 +194,12 @@ impl Application for NodeApplication {
         self.profile.sends_events(tpdo)
     }
 
-    fn is_quiet(&self, place: usize) -> bool {
-        self.profile.is_quiet(place)
+    fn is_quiet(&self, tpdo: usize, place: usize, image: &[u8]) -> bool {
+        self.profile.is_quiet(tpdo, place, image)
+    }
+
+    fn sent(&mut self, tpdo: usize, image: &[u8]) {
+        self.profile.sent(tpdo, image);
     }
 
     fn stores(&self, entry: &Entry) -> Option<Groups> {

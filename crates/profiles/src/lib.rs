@@ -15,6 +15,7 @@
 pub mod board;
 pub mod communication;
 pub mod fault;
+mod last_sent;
 mod list;
 pub mod pair;
 pub mod product;

@@ -345,7 +345,8 @@ macro_rules! personalities {
                 fn sends_events(&self, tpdo: u16) -> bool;
                 fn begin_events(&mut self, tpdo: u16, image: &mut [u8]);
                 fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool;
-                fn is_quiet(&self, place: usize) -> bool;
+                fn is_quiet(&self, tpdo: usize, place: usize, image: &[u8]) -> bool;
+                fn sent(&mut self, tpdo: usize, image: &[u8]);
                 fn take_preset(&mut self, image: &[u8]) -> Option<canopen::sdo::Multiplexer>;
                 fn takes_all_nodes(&self, rpdo: u16) -> bool;
                 fn broadcasts(&self, at: canopen::sdo::Multiplexer, image: &[u8]) -> bool;

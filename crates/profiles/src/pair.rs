@@ -146,8 +146,13 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         }
     }
 
-    fn is_quiet(&self, place: usize) -> bool {
-        self.0.is_quiet(place) || self.1.is_quiet(place)
+    fn is_quiet(&self, tpdo: usize, place: usize, image: &[u8]) -> bool {
+        self.0.is_quiet(tpdo, place, image) || self.1.is_quiet(tpdo, place, image)
+    }
+
+    fn sent(&mut self, tpdo: usize, image: &[u8]) {
+        self.0.sent(tpdo, image);
+        self.1.sent(tpdo, image);
     }
 
     fn take_preset(&mut self, image: &[u8]) -> Option<Multiplexer> {
@@ -251,7 +256,7 @@ mod tests {
             image[self.0] > 0
         }
 
-        fn is_quiet(&self, place: usize) -> bool {
+        fn is_quiet(&self, _: usize, place: usize, _: &[u8]) -> bool {
             place == self.0
         }
 
@@ -297,9 +302,9 @@ mod tests {
 
     #[test]
     fn an_object_and_a_threshold_belong_to_either_profile() {
-        let (pair, _) = two();
+        let (pair, image) = two();
         assert_eq!([0, 1, 2].map(|index| pair.handles(index, 0)), [true, true, false]);
-        assert_eq!([0, 1, 2].map(|place| pair.is_quiet(place)), [true, true, false]);
+        assert_eq!([0, 1, 2].map(|place| pair.is_quiet(0, place, &image)), [true, true, false]);
     }
 
     #[test]

@@ -122,11 +122,14 @@ pub trait Profile: Sized {
         false
     }
 
-    /// Whether a change of the value at this place of the image is below its threshold
+    /// Whether the change of the value at this place of the image, since the TPDO was sent, is below its threshold
     /// (`canopen::Application::is_quiet`).
-    fn is_quiet(&self, _place: usize) -> bool {
+    fn is_quiet(&self, _tpdo: usize, _place: usize, _image: &[u8]) -> bool {
         false
     }
+
+    /// A TPDO has been sent (`canopen::Application::sent`).
+    fn sent(&mut self, _tpdo: usize, _image: &[u8]) {}
 
     /// A preset by a digital input: the object to be written with its own value, as by a PDO.
     fn take_preset(&mut self, _image: &[u8]) -> Option<Multiplexer> {

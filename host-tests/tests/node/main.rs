@@ -30,5 +30,6 @@ mod resets;
 mod self_test;
 mod storing;
 mod stuck_client;
+mod thresholds;
 mod unsafe_code;
 mod ways;

@@ -45,6 +45,9 @@ pub trait Application {
     /// Whether a TPDO sends events ([`sends_events`](Application::sends_events)).
     const SENDS_EVENTS: bool = false;
 
+    /// Whether small changes of mapped values are not sent ([`is_quiet`](Application::is_quiet)).
+    const THRESHOLDS: bool = false;
+
     /// Whether PDOs take at most three quarters of the bus, so that heartbeat, EMCY and SDO always have room. A product
     /// whose PDOs cannot fill the bus, and that is short of flash, can do without.
     const BUS_SHARE: bool = true;
@@ -135,12 +138,18 @@ pub trait Application {
         false
     }
 
-    /// Whether a change of the value at this place of the image is too small for a TPDO of type 255, such as a change
-    /// below the threshold of a measured value. The TPDO is sent with the next change that is large enough. Called
-    /// after each [`publish`](crate::Device::publish) for the bytes that have changed since the TPDO was sent.
-    fn is_quiet(&self, _place: usize) -> bool {
+    /// Whether the change of the value at this place of the image since the last [`sent`](Application::sent) of the TPDO is
+    /// too small for a TPDO of type 255, such as a change below the threshold of a measured value. The TPDO is sent with the
+    /// next change that is large enough. `tpdo` is the position of the TPDO among those of the dictionary, from 0. Called
+    /// after each [`publish`](crate::Device::publish) for the bytes that have changed since the TPDO was sent. Only asked with
+    /// [`THRESHOLDS`](Application::THRESHOLDS).
+    fn is_quiet(&self, _tpdo: usize, _place: usize, _image: &[u8]) -> bool {
         false
     }
+
+    /// A TPDO, whose position is as for [`is_quiet`](Application::is_quiet), has been sent with the values of the image, for
+    /// whatever reason. Only called with [`THRESHOLDS`](Application::THRESHOLDS).
+    fn sent(&mut self, _tpdo: usize, _image: &[u8]) {}
 
     /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response
     /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, the write is

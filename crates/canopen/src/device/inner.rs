@@ -56,6 +56,7 @@ pub struct Inner<D: Definition> {
 
 impl<D: Definition> Choices for Inner<D> {
     const SENDS_EVENTS: bool = D::Application::SENDS_EVENTS;
+    const THRESHOLDS: bool = D::Application::THRESHOLDS;
     const BUS_SHARE: bool = D::Application::BUS_SHARE;
 }
 

@@ -155,8 +155,8 @@ impl<D: Definition> Device<D> {
         let context = &mut self.services.process_context(now, out);
         self.inner.self_start(context);
         if self.inner.state.has_pdos() {
-            self.inner.each_tpdo(Chain::Valid, |tpdo, image, application| {
-                tpdo.on_change(image, |place| application.is_quiet(place), context);
+            self.inner.each_tpdo(Chain::Valid, |tpdo, (number, image, application)| {
+                tpdo.on_change(image, |place| application.is_quiet(number, place, image), context);
             });
             let events_due = self.inner.send_events(context);
             self.inner.process_due = self.inner.process_due.min(events_due);
@@ -267,7 +267,7 @@ impl<D: Definition> Inner<D> {
     /// Answers a remote frame with each TPDO of its CAN-ID.
     fn on_remote(&mut self, frame: &Frame, context: &mut ProcessContext<'_, impl Transmit, Self>) {
         if Self::has(Has::REMOTE) {
-            self.each_tpdo(Chain::Valid, |tpdo, image, _| {
+            self.each_tpdo(Chain::Valid, |tpdo, (_, image, _)| {
                 if tpdo.requested().is_some_and(|id| id.get() == frame.id()) {
                     tpdo.on_remote(image, context);
                 }
@@ -279,11 +279,17 @@ impl<D: Definition> Inner<D> {
     pub(super) fn each_tpdo(
         &mut self,
         chain: Chain,
-        mut visit: impl FnMut(&mut Tpdo, &[u8], &D::Application),
+        mut visit: impl FnMut(&mut Tpdo, (usize, &[u8], &D::Application)),
     ) {
         let mut links = self.first_tpdos;
-        while let Some(tpdo) = self.tpdos.as_mut().get_mut(links.next(chain)) {
-            visit(tpdo, self.image.as_ref(), &self.application);
+        while let place = links.next(chain)
+            && let Some(tpdo) = self.tpdos.as_mut().get_mut(place)
+        {
+            let image = self.image.as_ref();
+            visit(tpdo, (place, image, &self.application));
+            if D::Application::THRESHOLDS && tpdo.take_sent() {
+                self.application.sent(place, image);
+            }
             if tpdo.is_pending() {
                 self.process_due = STALE;
             }
@@ -300,7 +306,7 @@ impl<D: Definition> Inner<D> {
             self.poll_sync(context.now);
         }
         let mut due = if Self::has(Has::RPDO) { self.poll_rpdos(context.now) } else { Tick::NEVER };
-        self.each_tpdo(Chain::Valid, |tpdo, image, _| {
+        self.each_tpdo(Chain::Valid, |tpdo, (_, image, _)| {
             tpdo.poll(image, context);
             due = due.min(tpdo.due());
         });

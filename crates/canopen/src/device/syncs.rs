@@ -75,7 +75,7 @@ impl<D: Definition> Inner<D> {
             }
         }
         self.application.synchronised(sync.counter, self.image.as_mut());
-        self.each_tpdo(Chain::Synchronous, |tpdo, image, _| tpdo.on_sync(sync, image, context));
+        self.each_tpdo(Chain::Synchronous, |tpdo, (_, image, _)| tpdo.on_sync(sync, image, context));
         if D::Application::SENDS_EVENTS && self.sends_events {
             self.send_events_with_sync(context);
         }

@@ -134,6 +134,8 @@ const fn cost(len: usize) -> u32 {
 pub(crate) trait Choices {
     /// Some TPDOs send events.
     const SENDS_EVENTS: bool;
+    /// Small changes of mapped values are not sent.
+    const THRESHOLDS: bool;
     /// The PDOs leave a share of the bus to the services.
     const BUS_SHARE: bool;
 }

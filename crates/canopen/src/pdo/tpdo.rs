@@ -69,6 +69,8 @@ pub struct Tpdo {
     settings: Settings,
     /// A transmission waits: for the end of the inhibit time, or for room in the queue.
     pending: bool,
+    /// It has been sent since [`Tpdo::take_sent`].
+    is_sent: bool,
     /// SYNCs since the last transmission.
     syncs: u8,
     /// The SYNC with the start value has arrived.
@@ -109,6 +111,7 @@ impl Element for Tpdo {
         is_valid: false,
         settings: Settings::UNUSED,
         pending: false,
+        is_sent: false,
         syncs: 0,
         is_counting: false,
         data: None,
@@ -299,7 +302,8 @@ impl Tpdo {
         is_quiet: impl Fn(usize) -> bool,
         context: &mut ProcessContext<'_, impl Transmit, C>,
     ) {
-        if self.settings.sends_on_change() && self.has_changed(image) && self.is_worth(image, is_quiet) {
+        let is_worth = || !C::THRESHOLDS || self.is_worth(image, is_quiet);
+        if self.settings.sends_on_change() && self.has_changed(image) && is_worth() {
             self.pending = true;
             self.poll(image, context);
         }
@@ -312,6 +316,11 @@ impl Tpdo {
         // An event is kept: the application does not give it again.
         self.pending &= self.events_of().is_some()
             || !matches!(kind, Transmission::SyncAcyclic | Transmission::SyncCyclic(_));
+    }
+
+    /// Whether the TPDO has been sent since the last call.
+    pub(crate) fn take_sent(&mut self) -> bool {
+        core::mem::take(&mut self.is_sent)
     }
 
     /// Whether one of the changes is to be sent.
@@ -356,6 +365,7 @@ impl Tpdo {
         self.pending = !is_sent;
         if is_sent {
             (self.data, self.sent) = (Some(data), context.now);
+            self.is_sent |= C::THRESHOLDS;
         } else {
             self.inhibited_until = context.now.plus(RETRY);
         }

@@ -13,6 +13,7 @@ pub use node::{
     handles, personality,
 };
 pub use objects::{ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, device_name, device_type, error_behaviour};
+pub(crate) use pdos::PDOS;
 pub use pdos::{
     RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, sync_start, tpdo_mappings, tpdos,
     transmission_type,

@@ -9,6 +9,9 @@ pub use objects::pdo::{cob_id, count, event_timer, inhibit_time, slot, sync_star
 
 use objects::pdo::{default_id, rpdo_parameter, tpdo_parameter};
 
+/// Number of PDOs in each direction.
+pub(crate) const PDOS: usize = 8;
+
 /// A mapping parameter of a PDO that can be a multiplexed one, as each PDO of every personality can.
 const fn mapping(index: u16, name: &'static str, mapped: &[i64]) -> [Object; 9] {
     objects::multiplexed(objects::pdo::mapping(index, name, mapped))
@@ -48,7 +51,7 @@ const fn tpdo(default: &Tpdo) -> [Object; 6] {
     objects::with(objects::with(rows, 2, default.transmission), 5, default.event_timer)
 }
 
-const RPDO_NAMES: [[&str; 2]; 8] = [
+const RPDO_NAMES: [[&str; 2]; PDOS] = [
     ["RPDO 1 communication parameter", "RPDO 1 mapping parameter"],
     ["RPDO 2 communication parameter", "RPDO 2 mapping parameter"],
     ["RPDO 3 communication parameter", "RPDO 3 mapping parameter"],
@@ -59,7 +62,7 @@ const RPDO_NAMES: [[&str; 2]; 8] = [
     ["RPDO 8 communication parameter", "RPDO 8 mapping parameter"],
 ];
 
-const TPDO_NAMES: [[&str; 2]; 8] = [
+const TPDO_NAMES: [[&str; 2]; PDOS] = [
     ["TPDO 1 communication parameter", "TPDO 1 mapping parameter"],
     ["TPDO 2 communication parameter", "TPDO 2 mapping parameter"],
     ["TPDO 3 communication parameter", "TPDO 3 mapping parameter"],

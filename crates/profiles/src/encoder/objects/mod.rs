@@ -70,7 +70,7 @@ impl Profile for Objects {
     type Fields = Fields;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, reports: [Reports::default(); 2] }
+        Objects { fields, reports: [Reports::NEW; 2] }
     }
 
     fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
@@ -88,8 +88,16 @@ impl Profile for Objects {
         }
     }
 
-    fn is_quiet(&self, place: usize) -> bool {
-        self.fields.is_quiet(&self.reports, place)
+    fn is_quiet(&self, tpdo: usize, place: usize, image: &[u8]) -> bool {
+        self.fields.is_quiet(&self.reports, tpdo, place, image)
+    }
+
+    // Not inlined: two personalities have an encoder.
+    #[inline(never)]
+    fn sent(&mut self, tpdo: usize, image: &[u8]) {
+        for (channel, reports) in self.fields.channels.iter().zip(&mut self.reports) {
+            reports.sent.take(tpdo, channel.position, image);
+        }
     }
 
     fn take_preset(&mut self, _: &[u8]) -> Option<Multiplexer> {

@@ -5,6 +5,7 @@ use crate::board::DIGITAL_INPUTS;
 use crate::encoder::{
     Area, Cam, Cams, ChannelParameters, ChannelValues, Command, LongSpeed, Module, Parameters, Snapshot,
 };
+use crate::last_sent::LastSent;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::NonZeroU16;
 
@@ -162,43 +163,45 @@ impl Channel {
 }
 
 /// Events of a channel since the last sample.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Reports {
-    /// The position that was last worth a TPDO of type 255.
-    position: u32,
-    /// The position is less than the threshold (2112h) away from it.
-    is_quiet: bool,
+    /// The position when each TPDO was sent.
+    pub(super) sent: LastSent,
     /// The preset input was off.
     was_off: bool,
     /// The preset input has gone on.
     pub(super) has_preset: bool,
 }
 
+impl Reports {
+    pub(super) const NEW: Reports = Reports { sent: LastSent::NEW, was_off: false, has_preset: false };
+}
+
 impl Channel {
     /// Takes the values of a millisecond.
     pub(super) fn report(&self, digital: [bool; DIGITAL_INPUTS], reports: &mut Reports, image: &[u8]) {
-        let position = self.position.u32(image);
-        let threshold = self.threshold.u32(image);
-        reports.is_quiet = position.abs_diff(reports.position) < threshold;
-        if !reports.is_quiet {
-            reports.position = position;
-        }
         let input = usize::from(self.preset_input.u8(image));
         let is_on = input.checked_sub(1).and_then(|input| digital.get(input)).is_none_or(|is_on| *is_on);
         reports.has_preset |= is_on && reports.was_off && input > 0;
         reports.was_off = !is_on;
     }
+
+    /// Whether the position is less than the threshold (2112h) away from the one that a TPDO has sent.
+    #[inline(never)]
+    fn is_quiet(&self, reports: &Reports, tpdo: usize, image: &[u8]) -> bool {
+        self.position.u32(image).abs_diff(reports.sent.of(tpdo)) < self.threshold.u32(image)
+    }
 }
 
 impl Fields {
-    /// Whether the value at this place belongs to a position that has hardly moved.
-    pub(super) fn is_quiet(&self, reports: &[Reports; 2], place: usize) -> bool {
-        let [first, _] = reports;
-        first.is_quiet && self.position.is_at(place)
-            || self.channels.iter().zip(reports).any(|(channel, reports)| {
-                let fields = [channel.position, channel.speed, channel.long_speed];
-                reports.is_quiet && fields.iter().any(|field| field.is_at(place))
-            })
+    /// Whether the value at this place belongs to a position that has hardly moved since a TPDO was sent.
+    pub(super) fn is_quiet(&self, reports: &[Reports; 2], tpdo: usize, place: usize, image: &[u8]) -> bool {
+        let is_first = self.position.is_at(place);
+        self.channels.iter().zip(reports).zip([is_first, false]).any(|((channel, reports), is_own)| {
+            let fields = [channel.position, channel.speed, channel.long_speed];
+            (is_own || fields.iter().any(|field| field.is_at(place)))
+                && channel.is_quiet(reports, tpdo, image)
+        })
     }
 
     /// Looks the fields up during compilation. `device_type` is the index of the device type: 1000h or 67FFh.

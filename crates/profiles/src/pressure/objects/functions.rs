@@ -7,6 +7,7 @@
 
 use canopen::dictionary::{Access, Dictionary, Field, Group, Mapping, Object, Type};
 
+use crate::last_sent::LastSent;
 use crate::pressure::ChannelValues;
 
 /// Number of alarms, at most 8.
@@ -144,36 +145,34 @@ pub(super) struct Functions {
     alarms: [Alarm; ALARMS],
     states: Field,
     general: Field,
-    thresholds: [Field; 2],
+    pub(super) thresholds: [Field; 2],
     lowest: [Field; 2],
     highest: [Field; 2],
     shift: u16,
 }
 
 /// Their state.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct States {
     /// The alarms whose value is beyond its limit, and those that have not been reset: one bit each.
     on: u8,
     latched: u8,
-    channels: [Channel; 2],
+    pub(super) channels: [ChannelState; 2],
 }
 
-#[derive(Debug, Default)]
-struct Channel {
-    /// The value that was last worth a TPDO of type 255.
-    reported: f32,
-    /// The value is less than the threshold away from it.
-    is_quiet: bool,
+#[derive(Debug)]
+pub(super) struct ChannelState {
+    /// The process value when each TPDO was sent.
+    pub(super) sent: LastSent,
     /// Lowest and highest value.
     extremes: Option<(f32, f32)>,
 }
 
 impl States {
-    /// Whether the changes of a channel are below its threshold.
-    pub(super) fn is_quiet(&self, channel: usize) -> bool {
-        self.channels.get(channel).is_some_and(|channel| channel.is_quiet)
-    }
+    pub(super) const NEW: States = {
+        const CHANNEL: ChannelState = ChannelState { sent: LastSent::NEW, extremes: None };
+        States { on: 0, latched: 0, channels: [CHANNEL; 2] }
+    };
 
     /// Forgets the extremes of these channels, one bit each.
     fn restart(&mut self, channels: u8) {
@@ -218,12 +217,8 @@ impl Functions {
     /// Takes the values of a millisecond. A value that is not measured changes nothing.
     #[inline(never)]
     pub(super) fn follow(&self, values: [&ChannelValues; 2], states: &mut States, image: &mut [u8]) {
-        for ((channel, values), threshold) in states.channels.iter_mut().zip(values).zip(self.thresholds) {
+        for (channel, values) in states.channels.iter_mut().zip(values) {
             let value = values.process_value;
-            channel.is_quiet = (value - channel.reported).abs() < threshold.f32(image);
-            if !channel.is_quiet {
-                channel.reported = value;
-            }
             if values.measured.is_some() {
                 let (low, high) = channel.extremes.unwrap_or((value, value));
                 channel.extremes = Some((low.min(value), high.max(value)));

@@ -80,7 +80,7 @@ impl Profile for Objects {
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, measured: [None; 2], states: States::default() }
+        Objects { fields, measured: [None; 2], states: States::NEW }
     }
 
     fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
@@ -107,8 +107,12 @@ impl Profile for Objects {
         self.states.written(index, entry.sub(), value);
     }
 
-    fn is_quiet(&self, place: usize) -> bool {
-        self.fields.is_quiet(&self.states, place)
+    fn is_quiet(&self, tpdo: usize, place: usize, image: &[u8]) -> bool {
+        self.fields.is_quiet(&self.states, tpdo, place, image)
+    }
+
+    fn sent(&mut self, tpdo: usize, image: &[u8]) {
+        self.fields.sent(&mut self.states, tpdo, image);
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {

@@ -103,13 +103,24 @@ impl Fields {
         }
     }
 
-    /// Whether the value at this place belongs to a channel whose changes are below its threshold.
-    pub(super) fn is_quiet(&self, states: &States, place: usize) -> bool {
-        [&self.pressure, &self.temperature].into_iter().enumerate().any(|(number, channel)| {
+    /// Whether the value at this place belongs to a channel whose process value is less than its threshold away from the
+    /// one that a TPDO has sent.
+    pub(super) fn is_quiet(&self, states: &States, tpdo: usize, place: usize, image: &[u8]) -> bool {
+        let channels = [&self.pressure, &self.temperature].into_iter().zip(&states.channels);
+        channels.zip(self.functions.thresholds).any(|((channel, state), threshold)| {
             let Channel { field_value, process_value, process_value16, process_value32, .. } = channel;
             let fields = [field_value, process_value, process_value16, process_value32];
-            states.is_quiet(number) && fields.iter().any(|field| field.is_at(place))
+            let sent = f32::from_bits(state.sent.of(tpdo));
+            fields.iter().any(|field| field.is_at(place))
+                && (process_value.f32(image) - sent).abs() < threshold.f32(image)
         })
+    }
+
+    /// A TPDO has been sent.
+    pub(super) fn sent(&self, states: &mut States, tpdo: usize, image: &[u8]) {
+        for (channel, state) in [&self.pressure, &self.temperature].into_iter().zip(&mut states.channels) {
+            state.sent.take(tpdo, channel.process_value, image);
+        }
     }
 
     /// Copies a snapshot into the image.
