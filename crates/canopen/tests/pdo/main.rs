@@ -10,3 +10,4 @@ mod interlocks;
 mod lean;
 mod many;
 mod places;
+mod thresholds;
