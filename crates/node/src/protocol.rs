@@ -48,6 +48,7 @@ impl Protocol {
     }
 
     /// Keeps the job for `take_job`, and takes note of new parameters.
+    #[inline(never)]
     pub(crate) fn note(&mut self, next: Next) -> Next {
         if next.parameters {
             self.older_samples = OLDER_SAMPLES;

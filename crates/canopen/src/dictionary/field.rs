@@ -66,6 +66,8 @@ impl Field {
     }
 
     /// The `K` bytes from the start of the value. For a value of another size, some are those of a neighbour.
+    // Not inlined: profiles read hundreds of values.
+    #[inline(never)]
     #[must_use]
     pub fn load<const K: usize>(self, image: &[u8]) -> [u8; K] {
         image.get(usize::from(self.offset)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; K])
