@@ -5,15 +5,11 @@ use canopen::lss::BitRate;
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::board::Outputs;
-use profiles::{Parameters, ROOM, Snapshot};
+use profiles::{OlderSamples, Parameters, ROOM, Snapshot};
 
 use crate::application::NodeApplication;
 use crate::faults::{Shown, present};
 use crate::{Next, Setup};
-
-/// Samples that may have been taken with the old parameters: the sample of this millisecond may have been taken, and
-/// the next one may have begun, before the new parameters arrived.
-const OLDER_SAMPLES: u8 = 3;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
 /// Every call returns the resulting actions: see [`Next`].
@@ -24,8 +20,7 @@ pub struct Protocol {
     pub(crate) shown: Shown,
     /// The job of the last `Action::Store`, until it is taken.
     pub(crate) job: Option<Job>,
-    /// Number of samples that may still have been taken with older parameters.
-    pub(crate) older_samples: u8,
+    pub(crate) older_samples: OlderSamples,
 }
 
 impl Protocol {
@@ -35,7 +30,7 @@ impl Protocol {
         let dictionary = setup.personality.dictionary();
         let device =
             Device::new(dictionary, setup.node_id, NodeApplication::new(setup)).with_bit_rate(setup.bit_rate);
-        Protocol { device, shown: Shown::default(), job: None, older_samples: 0 }
+        Protocol { device, shown: Shown::default(), job: None, older_samples: OlderSamples::NONE }
     }
 
     /// Initialises the values that the pending reset covers, then boots up. To be called once the bus is ready, and
@@ -51,7 +46,7 @@ impl Protocol {
     #[inline(never)]
     pub(crate) fn note(&mut self, next: Next) -> Next {
         if next.parameters {
-            self.older_samples = OLDER_SAMPLES;
+            self.older_samples = OlderSamples::BEGIN;
         }
         if let Some(Action::Store(job)) = next.action {
             self.job = Some(job);
@@ -124,14 +119,13 @@ impl Protocol {
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
-        let was_waiting = self.older_samples > 0;
-        self.older_samples = self.older_samples.saturating_sub(1);
+        let is_last = self.older_samples.take();
         let changed = self.shown.update(present(snapshot));
         if changed != 0 {
             self.follow_faults(changed, now);
         }
         let next = self.device.publish(now, out, NodeApplication::show_values);
-        let can_store = was_waiting && self.older_samples == 0 && self.job.is_some();
+        let can_store = is_last && self.job.is_some();
         if can_store { Next { services: now, ..next } } else { next }
     }
 

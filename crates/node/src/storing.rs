@@ -42,7 +42,7 @@ impl Protocol {
     pub fn take_job(&mut self, taken: &mut StoreJob) -> bool {
         let application = self.device.application();
         let is_measured = !matches!(application.snapshot, Snapshot::Nothing);
-        if is_measured && self.older_samples > 0 && matches!(self.job, Some(Job::Store(_))) {
+        if is_measured && self.older_samples.are_left() && matches!(self.job, Some(Job::Store(_))) {
             taken.job = None;
             return false;
         }
@@ -79,6 +79,9 @@ impl Protocol {
         let application = self.device.application_mut();
         application.configured = application.configured.after(job);
         if let Job::Store(groups) | Job::Restore(groups) = job {
+            if groups.contains(Group::Application) {
+                application.is_restored = matches!(job, Job::Restore(_));
+            }
             for group in Group::COMMON.into_iter().filter(|group| groups.contains(*group)) {
                 application.stored.replace(group, done.packed.get(group));
             }

@@ -17,6 +17,7 @@ pub mod communication;
 pub mod fault;
 mod last_sent;
 mod list;
+mod older_samples;
 pub mod pair;
 pub mod product;
 pub mod profile;
@@ -26,6 +27,8 @@ pub mod combined;
 pub mod encoder;
 pub mod lift;
 pub mod pressure;
+
+pub use older_samples::OlderSamples;
 
 personalities! {
     Pressure => pressure, "pressure.eds", "Pressure and temperature transmitter, CiA 404";

@@ -42,7 +42,7 @@ fn the_parameters_of_each_device_act_on_its_own_values() {
     bench.write(0x6931, 1, &0x0322_0000_u32.to_le_bytes()).unwrap();
     bench.write(0x6932, 1, &[1]).unwrap();
     bench.write(0x6000, 0, &[1, 0]).unwrap();
-    measure(&mut bench);
+    (0..2).for_each(|_| measure(&mut bench));
     let kilopascal = i32::from_le_bytes(bench.read(0x9930, 1).unwrap().try_into().unwrap());
     assert!((kilopascal - 2500).abs() <= 1, "{kilopascal}");
     // In the opposite direction the first step has the highest position.

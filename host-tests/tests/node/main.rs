@@ -22,6 +22,7 @@ mod lossy_bus;
 mod memory_map;
 mod module_cycles;
 mod object_tables;
+mod older_samples;
 mod personalities;
 mod pressure_node;
 mod program_gate;

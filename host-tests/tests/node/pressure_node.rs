@@ -3,7 +3,7 @@
 use canopen::{Duration, Frame, Instant};
 use host_tests::bench::{Bench, ID, Queue, intact, raw, setup};
 use node::fault::UNEXPECTED_RESET;
-use node::{Action, BusEvent, Measurement, Protocol, State};
+use node::{Action, BusEvent, Measurement, Personality, Protocol, State};
 use profiles::board::{Inputs, RawEncoder};
 
 const TPDO1: u16 = 0x180 + ID as u16;
@@ -154,7 +154,7 @@ fn the_default_span_is_the_range_of_the_transducer() {
 fn autozero_is_possible_though_an_integer_is_clipped() {
     let mut bench = Bench::booted();
     bench.write(0x6131, 1, &0x0022_0000_u32.to_le_bytes()).unwrap();
-    bench.sample(&raw(250_000.0, 298.15));
+    (0..4).for_each(|_| bench.sample(&raw(250_000.0, 298.15)));
     assert_eq!(bench.read(0x6150, 1).unwrap()[0] & 1, 1, "clipped");
     assert_eq!(bench.write(0x6125, 1, b"zero"), Ok(()));
     bench.sample(&raw(250_000.0, 298.15));
@@ -407,6 +407,27 @@ fn an_alarm_has_a_hysteresis_and_a_latched_alarm_stays_until_its_reset() {
         bench.write(index, sub, &[value]).unwrap();
         measure(&mut bench, 3.0);
         assert_eq!(bits(&mut bench, 0x6600, 1), 0, "{index:X}h");
+    }
+}
+
+#[test]
+fn a_threshold_and_a_hysteresis_are_not_negative() {
+    for (personality, shift) in [(Personality::Pressure, 0), (Personality::Combined, 0x800)] {
+        let mut bench = Bench::booted_as(personality);
+        for (index, subs) in [(0x6133, 2), (0x650B, 4)] {
+            for sub in 1..=subs {
+                let at = (index + shift, sub);
+                let before = bench.read(at.0, at.1);
+                for value in [-1.0_f32, -1e-30, f32::NAN] {
+                    let result = bench.write(at.0, at.1, &value.to_le_bytes());
+                    assert_eq!(result, Err(0x0609_0030), "{at:X?} {value}");
+                }
+                assert_eq!(bench.read(at.0, at.1), before);
+                for value in [0.0_f32, 0.5] {
+                    assert_eq!(bench.write(at.0, at.1, &value.to_le_bytes()), Ok(()), "{at:X?} {value}");
+                }
+            }
+        }
     }
 }
 

@@ -1,6 +1,6 @@
-//! A reset of the communication leaves the objects from 2000h on alone (CiA 301, 7.3.2.2.3).
+//! What resets restore. A reset of the communication leaves the objects from 2000h on alone (CiA 301, 7.3.2.2.3).
 
-use host_tests::bench::Bench;
+use host_tests::bench::{Bench, raw};
 use node::Personality;
 
 const RESET_COMMUNICATION: u8 = 0x82;
@@ -61,6 +61,40 @@ fn parameters_to_be_restored_stay_until_the_node_is_reset() {
             bench.write(0x1011, 3, b"load").unwrap();
             reset_communication(&mut bench);
             assert_eq!(lost(&mut bench, &expected), [], "{personality:?} {id}");
+        }
+    }
+}
+
+/// A preset, by SDO or by a button, stores the whole application group, which would end the restore.
+#[test]
+fn no_preset_ends_a_restore_before_the_reset() {
+    let presets = [
+        (Personality::Encoder, (0x6003, 0)),
+        (Personality::Encoder, (0x6010, 1)),
+        (Personality::Combined, (0x6003, 0)),
+        (Personality::Lift, (0x6382, 1)),
+    ];
+    for (personality, (index, sub)) in presets {
+        for restored in [1, 3] {
+            let booted = || {
+                let mut bench = Bench::booted_as(personality);
+                (0..20).for_each(|_| bench.sample(&raw(0.0, 298.15)));
+                bench
+            };
+            let preset = 77_u32.to_le_bytes();
+            let mut bench = booted();
+            assert_eq!(bench.write(index, sub, &preset), Ok(()), "{personality:?}");
+            bench.write(0x1011, restored, b"load").unwrap();
+            let name = format!("{personality:?}, {index:X}h, 1011h:{restored}");
+            assert_eq!(bench.write(index, sub, &preset), Err(0x0800_0022), "{name}");
+            reset_communication(&mut bench);
+            assert_eq!(bench.write(index, sub, &preset), Err(0x0800_0022), "{name}");
+            bench.write(0x1010, 3, b"save").unwrap();
+            assert_eq!(bench.write(index, sub, &preset), Ok(()), "a save ends the restore, {name}");
+            bench.write(0x1011, restored, b"load").unwrap();
+            let mut bench = bench.power_cycled();
+            (0..20).for_each(|_| bench.sample(&raw(0.0, 298.15)));
+            assert_eq!(bench.write(index, sub, &preset), Ok(()), "{name}");
         }
     }
 }

@@ -25,6 +25,7 @@ use canopen::sdo::{Abort, Multiplexer};
 use super::{Encoder, Parameters, Snapshot};
 use crate::communication::{self, RPDOS, device_name, error_behaviour, tpdo_mappings, tpdos};
 use crate::fault::Fault;
+use crate::older_samples::OlderSamples;
 use crate::profile::Profile;
 
 /// The encoder type that the default parameters describe.
@@ -111,6 +112,13 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if let Some(reports) = self.reports.get_mut(usize::from(entry.sub().max(1) - 1)) {
+            match entry.index() {
+                0x2100..=0x2103 => reports.older = OlderSamples::BEGIN,
+                0x6003 | 0x6010 if reports.older.are_left() => return Err(Abort::DeviceState),
+                _ => {}
+            }
+        }
         self.fields.write(entry, bytes, image)
     }
 

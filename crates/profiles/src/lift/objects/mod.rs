@@ -25,6 +25,7 @@ use super::{Lift, Parameters, Snapshot};
 use crate::board::Outputs;
 use crate::communication::{device_name, device_type, error_behaviour};
 use crate::fault::Fault;
+use crate::older_samples::OlderSamples;
 use crate::pressure;
 use crate::profile::Profile;
 
@@ -68,6 +69,8 @@ pub struct Objects {
     fields: &'static Fields,
     calls: Calls,
     lamps: panel::LampStates,
+    /// Samples from before the last write to a parameter of position or load.
+    older: OlderSamples,
 }
 
 /// TPDO of the virtual inputs; `OUTPUTS` is the RPDO of the virtual outputs.
@@ -81,7 +84,12 @@ impl Profile for Objects {
     type Fields = Fields;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, calls: Calls::default(), lamps: panel::LampStates::default() }
+        Objects {
+            fields,
+            calls: Calls::default(),
+            lamps: panel::LampStates::default(),
+            older: OlderSamples::NONE,
+        }
     }
 
     fn initialise(&mut self, image: &mut [u8], _defaults: Groups) {
@@ -96,6 +104,7 @@ impl Profile for Objects {
         self.fields.publish(snapshot, image);
         self.calls.observe(snapshot.buttons);
         self.lamps.milliseconds = self.lamps.milliseconds.wrapping_add(1);
+        self.older.take();
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {
@@ -103,6 +112,9 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if self.older.are_left() && matches!(entry.index(), 0x6382 | 0x6486) {
+            return Err(Abort::DeviceState);
+        }
         self.fields.write(entry, bytes, image)
     }
 
@@ -129,6 +141,10 @@ impl Profile for Objects {
     }
 
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        if matches!(entry.index(), 0x2100..=0x2103 | 0x2200..=0x2202 | 0x2300..=0x2301 | 0x2311..=0x2312 | 0x6384)
+        {
+            self.older = OlderSamples::BEGIN;
+        }
         match (entry.index(), entry.sub()) {
             (0x6011, 0) => self.follow_output(image),
             // Old presses are no calls of a panel that has just been chosen.

@@ -89,8 +89,8 @@ pub(crate) const REAL: &[Object] = &[
     digits(2, "Temperature decimal digits"),
     // A TPDO of type 255 is sent when the process value has changed by so much; 0: with each change.
     both(0x6133, "AI interrupt delta input process value"),
-    parameter(0x6133, 1, "Pressure interrupt delta", Type::Real32).unit(PV),
-    parameter(0x6133, 2, "Temperature interrupt delta", Type::Real32).unit(PV),
+    parameter(0x6133, 1, "Pressure interrupt delta", Type::Real32).unit(PV).handled(),
+    parameter(0x6133, 2, "Temperature interrupt delta", Type::Real32).unit(PV).handled(),
     both(0x6139, "AI autotare"),
     autotare(1, "Pressure autotare"),
     autotare(2, "Temperature autotare"),

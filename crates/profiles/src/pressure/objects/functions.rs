@@ -8,6 +8,7 @@
 use canopen::dictionary::{Access, Dictionary, Field, Group, Mapping, Object, Type};
 
 use crate::last_sent::LastSent;
+use crate::older_samples::OlderSamples;
 use crate::pressure::ChannelValues;
 
 /// Number of alarms, at most 8.
@@ -55,7 +56,7 @@ const fn limit(sub: u8, name: &'static str) -> Object {
 }
 
 const fn hysteresis(sub: u8, name: &'static str) -> Object {
-    alarm(0x650B, sub, name, Type::Real32)
+    alarm(0x650B, sub, name, Type::Real32).handled()
 }
 
 const fn reset(sub: u8, name: &'static str) -> Object {
@@ -157,6 +158,8 @@ pub(super) struct States {
     /// The alarms whose value is beyond its limit, and those that have not been reset: one bit each.
     on: u8,
     latched: u8,
+    /// Samples from before the last restart of the extremes.
+    older: OlderSamples,
     pub(super) channels: [ChannelState; 2],
 }
 
@@ -171,11 +174,12 @@ pub(super) struct ChannelState {
 impl States {
     pub(super) const NEW: States = {
         const CHANNEL: ChannelState = ChannelState { sent: LastSent::NEW, extremes: None };
-        States { on: 0, latched: 0, channels: [CHANNEL; 2] }
+        States { on: 0, latched: 0, older: OlderSamples::NONE, channels: [CHANNEL; 2] }
     };
 
     /// Forgets the extremes of these channels, one bit each.
     fn restart(&mut self, channels: u8) {
+        self.older = OlderSamples::BEGIN;
         for (channel, bit) in self.channels.iter_mut().zip([1, 2]) {
             if channels & bit != 0 {
                 channel.extremes = None;
@@ -224,11 +228,16 @@ impl Functions {
                 channel.extremes = Some((low.min(value), high.max(value)));
             }
         }
-        for (channel, (lowest, highest)) in states.channels.iter().zip(self.lowest.iter().zip(&self.highest))
-        {
+        let is_older = states.older.are_left();
+        states.older.take();
+        let places = self.lowest.iter().zip(&self.highest);
+        for (channel, (lowest, highest)) in states.channels.iter_mut().zip(places) {
             let (low, high) = channel.extremes.unwrap_or_default();
             lowest.store(image, low.to_le_bytes());
             highest.store(image, high.to_le_bytes());
+            if is_older {
+                channel.extremes = None;
+            }
         }
         self.follow_alarms(values, states, image);
     }

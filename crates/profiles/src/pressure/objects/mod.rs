@@ -24,6 +24,7 @@ use canopen::sdo::Abort;
 use super::{Parameters, Snapshot, Transmitter};
 use crate::communication::{device_name, device_type, error_behaviour};
 use crate::fault::{Fault, Flags};
+use crate::older_samples::OlderSamples;
 use crate::profile::Profile;
 
 /// Device type: CiA 404, two analogue input blocks.
@@ -69,6 +70,8 @@ pub struct Objects {
     fields: &'static Fields,
     /// The process value of each channel without its offset, from an intact sensor.
     measured: [Option<f32>; 2],
+    /// Samples from before the last write to a parameter of the process values.
+    older: OlderSamples,
     states: States,
 }
 
@@ -80,7 +83,7 @@ impl Profile for Objects {
     const REGISTER_BITS: u8 = 1;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, measured: [None; 2], states: States::NEW }
+        Objects { fields, measured: [None; 2], older: OlderSamples::NONE, states: States::NEW }
     }
 
     fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
@@ -94,7 +97,9 @@ impl Profile for Objects {
     }
 
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
-        self.measured = [snapshot.pressure.measured, snapshot.temperature.measured];
+        let measured = [snapshot.pressure.measured, snapshot.temperature.measured];
+        self.measured = if self.older.are_left() { [None; 2] } else { measured };
+        self.older.take();
         self.fields.publish(snapshot, image);
         let values = [&snapshot.pressure, &snapshot.temperature];
         self.fields.functions.follow(values, &mut self.states, image);
@@ -103,6 +108,9 @@ impl Profile for Objects {
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         let index = entry.index();
         let index = if index < 0x6000 { index } else { index.wrapping_sub(self.fields.shift) };
+        if matches!(index, 0x6110..=0x6123 | 0x6126..=0x6131 | 0x2200..=0x2202) {
+            (self.measured, self.older) = ([None; 2], OlderSamples::BEGIN);
+        }
         let value = entry.field().u8(image);
         self.states.written(index, entry.sub(), value);
     }

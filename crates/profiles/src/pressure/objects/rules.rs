@@ -15,6 +15,8 @@ pub(super) enum Rule {
     Autotare,
     /// 6503h: a process value, or none.
     AlarmLink,
+    /// 6133h and 650Bh: threshold and hysteresis, which are widths.
+    Width,
     /// 6131h:1: only units of pressure are accepted.
     PressureUnit,
     /// 6131h:2: only units of temperature are accepted.
@@ -30,6 +32,7 @@ impl Rule {
             (0x6125, 1..) => Some(Rule::Autozero),
             (0x6139, 1..) => Some(Rule::Autotare),
             (0x6503, 1..) => Some(Rule::AlarmLink),
+            (0x6133 | 0x650B, 1..) => Some(Rule::Width),
             (0x6131, 1) => Some(Rule::PressureUnit),
             (0x6131, 2) => Some(Rule::TemperatureUnit),
             _ => match calibration::Rule::of(index, sub) {
@@ -76,6 +79,7 @@ impl Fields {
                 }
                 return Ok(());
             }
+            Some(Rule::Width) => f32::from_bits(code) >= 0.0,
             Some(Rule::PressureUnit) => Unit::pressure(code).is_some(),
             Some(Rule::TemperatureUnit) => Unit::temperature(code).is_some(),
             None => true,
