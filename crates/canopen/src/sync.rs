@@ -127,7 +127,12 @@ impl Consumer {
 
     /// Whether the SYNC before this one was missing or had the wrong length. Reported once.
     pub(crate) fn is_back(&mut self) -> bool {
-        core::mem::take(&mut self.is_disturbed)
+        let is_back = self.is_disturbed;
+        // Most SYNCs store nothing.
+        if is_back {
+            self.is_disturbed = false;
+        }
+        is_back
     }
 }
 
