@@ -2,6 +2,7 @@
 
 mod cob_id;
 mod plan;
+mod services;
 
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ use crate::object::at;
 use crate::sdo::Error;
 use crate::value::Value;
 
-pub use plan::{Write, plan};
+pub use plan::{Write, looked_at, plan};
 
 /// Values by index and sub-index.
 #[derive(Clone, Debug, Default, PartialEq)]

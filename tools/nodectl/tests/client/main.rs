@@ -15,6 +15,7 @@ mod loader;
 mod lss;
 mod meanings;
 mod net;
+mod order;
 mod pressure;
 mod process;
 mod rules;

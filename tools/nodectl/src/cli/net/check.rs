@@ -1,6 +1,6 @@
 //! `nodectl net check`: the bus and its file, compared.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Display;
 
 use canopen::nmt::State;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::finding::{Finding, What, end, print};
 use super::senders::{Senders, listed};
 use super::{Failure, LISTEN, Session, catalogue, patience};
-use crate::configuration::Configuration;
+use crate::configuration::{Configuration, looked_at};
 use crate::net::{Date, Plan, PlannedNode, Start};
 use crate::object::{Place, at};
 use crate::scan::{Presence, scan};
@@ -125,8 +125,8 @@ fn words(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> String {
     meaning.unwrap_or_else(|| visible(&value.to_string()))
 }
 
-/// The values that a node has of the wanted parameters, and the COB-IDs and sizes of the PDOs to which they belong. A value
-/// that the node refuses is missing.
+/// The values that a node has of the wanted parameters, and of the objects on which the steps to them depend, such as the
+/// COB-ID of a PDO. A value that the node refuses is missing.
 pub(super) fn values(
     session: &mut Session,
     node: NodeId,
@@ -134,13 +134,10 @@ pub(super) fn values(
     wanted: &Configuration,
 ) -> Result<Configuration, Failure> {
     let mut present = Configuration::default();
-    let pdos = wanted.values.keys().filter(|key| (0x1400..=0x1BFF).contains(&key.0));
-    let of_pdos = pdos.flat_map(|key| [(key.0 & !0x0200, 1), (key.0 | 0x0200, 0)]);
-    let keys: BTreeSet<(u16, u8)> = wanted.values.keys().copied().chain(of_pdos).collect();
-    for (index, sub) in &keys {
-        let Some(entry) = catalogue.sheet().get(*index, *sub) else { continue };
-        if let Some(bytes) = session.optional(node, at(*index, *sub))? {
-            present.values.insert((*index, *sub), Value::decode(&bytes, entry.data_type));
+    for (index, sub) in looked_at(wanted) {
+        let Some(entry) = catalogue.sheet().get(index, sub) else { continue };
+        if let Some(bytes) = session.optional(node, at(index, sub))? {
+            present.values.insert((index, sub), Value::decode(&bytes, entry.data_type));
         }
     }
     Ok(present)
