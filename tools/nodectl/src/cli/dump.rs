@@ -15,7 +15,7 @@ use super::replacement::Replacement;
 use super::session::loss;
 use super::store::{Group, Order, sign};
 use super::{Failure, Session};
-use crate::configuration::{Configuration, Difference, Write, is_unclear, node_of, plan};
+use crate::configuration::{Configuration, Dcf, Difference, Write, is_unclear, node_of, plan};
 use crate::object::{Place, at};
 use crate::sdo::AbortCode;
 use crate::text::{counted, note, visible};
@@ -98,17 +98,15 @@ impl Dump {
         let sheet = session.sheet_of(node)?;
         note_unclear(&sheet);
         let values = session.configuration(node, &sheet)?;
-        let mut file = values.to_sheet(&sheet, node, self.all);
-        let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
-        file.commissioning =
-            Some(Commissioning { node_id: node.get(), bit_rate: session.options.known_bit_rate(), serial });
+        let commissioning = commissioning(session, node)?;
         let name = self.file.file_name().and_then(|name| name.to_str()).unwrap_or("-");
         let reals = if self.bits { Reals::Bits } else { Reals::Decimal };
-        let text = file.to_dcf(name, reals);
+        let dcf = values.to_dcf(&sheet, name, commissioning, self.all, reals);
+        note_left_out(&sheet, &dcf);
         if self.file.as_os_str() == "-" {
-            return Ok(session.output.write(text.as_bytes())?);
+            return Ok(session.output.write(dcf.text.as_bytes())?);
         }
-        Replacement::write(&self.file, text.as_bytes())
+        Replacement::write(&self.file, dcf.text.as_bytes())
     }
 }
 
@@ -178,6 +176,25 @@ fn print(session: &mut Session, sheet: &Eds, differences: Vec<Difference>) -> Re
         let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry));
         session.print(&Changed { at, name, first, second })
     })
+}
+
+/// The device that a configuration file is for.
+pub(super) fn commissioning(session: &mut Session, node: NodeId) -> Result<Commissioning, Failure> {
+    let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
+    Ok(Commissioning { node_id: node.get(), bit_rate: session.options.known_bit_rate(), serial })
+}
+
+/// Names the parameters whose values a file cannot have.
+pub(super) fn note_left_out(sheet: &Eds, dcf: &Dcf) {
+    for at in &dcf.left_out {
+        let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry)).unwrap_or_default();
+        note(format_args!(
+            "warning: {} {} is left out: a file cannot have an empty value, a line break, spaces at the ends or a \
+             comment (\" ;\") in a text",
+            Place(*at),
+            visible(&name)
+        ));
+    }
 }
 
 /// Warns the user of a file of another node-ID.

@@ -21,6 +21,7 @@ mod process;
 mod rules;
 mod safety;
 mod simulate;
+mod texts;
 mod trace;
 mod transfers;
 mod update;
