@@ -21,6 +21,8 @@ mod process;
 mod rules;
 mod safety;
 mod simulate;
+#[cfg(unix)]
+mod targets;
 mod texts;
 mod trace;
 mod transfers;

@@ -8,7 +8,7 @@ use eds::Reals;
 use serde::Serialize;
 
 use super::super::dump::{commissioning, note_left_out};
-use super::super::replacement::Replacement;
+use super::super::replacement::{Replacement, check_is_file};
 use super::check::{date, is_there};
 use super::{Failure, LISTEN, Session};
 use crate::object::at;
@@ -23,6 +23,7 @@ struct Done {
 }
 
 pub(super) fn run(session: &mut Session, file: &Path) -> Result<(), Failure> {
+    check_is_file(file)?;
     session.has_many_nodes = true;
     let found = scan(&mut session.network, LISTEN)?;
     let nodes: Vec<NodeId> = found.keys().copied().filter(|node| is_there(&found, *node)).collect();
