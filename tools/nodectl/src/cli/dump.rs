@@ -13,6 +13,7 @@ use serde::{Serialize, Serializer};
 use super::read::place;
 use super::replacement::Replacement;
 use super::session::loss;
+use super::sheets::misfit;
 use super::store::{Group, Order, sign};
 use super::{Failure, Session};
 use crate::configuration::{Configuration, Dcf, Difference, Write, is_unclear, node_of, plan};
@@ -61,7 +62,7 @@ pub(super) struct Apply {
     #[arg(long)]
     save: bool,
 
-    /// Write also a file for another product, and one with missing parts or values that cannot be read.
+    /// Write also a file for another product or vendor, and one with missing parts or values that cannot be read.
     #[arg(long)]
     force: bool,
 }
@@ -165,7 +166,7 @@ impl Apply {
         }
         let refusal = match loss(sheet) {
             Some(words) => Some(words),
-            None => mismatch(session, node, sheet)?.map(|words| format!("it is {words}")),
+            None => mismatch(session, node, sheet)?,
         };
         refusal.map_or(Ok(()), |words| Err(Failure::file(&self.file, words)))
     }
@@ -219,12 +220,12 @@ fn note_unclear(sheet: &Eds) {
 }
 
 /// Why a file does not fit a node. A node would refuse the file of another product object by object, so nothing is
-/// written then.
+/// written then. A product code is unique only together with the vendor-ID.
 pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Result<Option<String>, Failure> {
-    let device = session.word(node, at(0x1018, 2))?.unwrap_or(0);
-    let product = sheet.device.product_number;
-    let words = || format!("for product {product:08X}h, and the node is product {device:08X}h");
-    Ok((device != product).then(words))
+    let device = (session.word(node, at(0x1018, 1))?, session.word(node, at(0x1018, 2))?);
+    let of_file = (sheet.device.vendor_number, sheet.device.product_number);
+    let is_same = (device.0.unwrap_or(0), device.1.unwrap_or(0)) == of_file;
+    Ok((!is_same).then(|| misfit(sheet, device)))
 }
 
 /// Writes the parameters that differ from the wanted ones, until `read` shows no difference. Returns the number of

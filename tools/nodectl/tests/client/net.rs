@@ -220,6 +220,33 @@ fn a_truncated_configuration_file_changes_no_node() {
     assert_eq!((code, text.contains("1018h is listed and has no section")), (7, true), "{text}");
 }
 
+/// The identity of the node is that of the data sheet, and the values would be those of another device.
+#[test]
+fn a_configuration_file_for_another_device_than_the_data_sheet_is_refused() {
+    let wire = Wire::new(devices(1));
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let text = fs::read_to_string(corpus("plain-io.eds")).unwrap();
+    let sheet = corpus("plain-io.eds");
+    for (number, is_same) in [("0x101", true), ("0x102", false)] {
+        fs::write(
+            folder.join("other.dcf"),
+            text.replace("ProductNumber=0x101", &format!("ProductNumber={number}")),
+        )
+        .unwrap();
+        let file = folder.join("other.yaml");
+        let lines = format!(
+            "start: none\nnodes:\n  - node: 1\n    sheet: {}\n    configuration: other.dcf\n",
+            sheet.display()
+        );
+        fs::write(&file, lines).unwrap();
+        let (_, result) = run(&wire, &["net", "apply", file.to_str().unwrap()]);
+        let text = result.map_or_else(|failure| failure.to_string(), |()| String::new());
+        let words = "node 1: the configuration file is for vendor 000003E7h, product 00000102h";
+        assert_eq!(text.contains(words), !is_same, "{text}");
+        assert_eq!(text.is_empty(), is_same, "{text}");
+    }
+}
+
 #[test]
 fn a_date_spares_the_comparison_and_is_written_last() {
     let mut text = fs::read_to_string(corpus("plain-encoder.eds")).unwrap();

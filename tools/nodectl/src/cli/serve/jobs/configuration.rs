@@ -76,7 +76,7 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
     Ok(Job::of_node(node, move |context| {
         let mismatch = mismatch(&mut context.session, node, &sheet)?;
         if let Some(words) = mismatch.filter(|_| !how.force) {
-            return Err(Failure::Usage(format!("the file is {words}")));
+            return Err(Failure::Usage(words));
         }
         let wanted = Configuration::of_sheet(&sheet, node);
         if how.dry_run {
