@@ -76,6 +76,7 @@ impl Plan {
             if nodes.iter().any(|other| other.node == node) {
                 return Err(PlanError::Twice(member.node).into());
             }
+            check_consumes(node, &member)?;
             let eds = member.sheet.as_deref().map(&mut sheet).transpose()?;
             let dcf = member.configuration.as_deref().map(&mut configuration).transpose()?;
             if let (Some(sheet), Some(dcf)) = (&eds, &dcf) {
@@ -104,6 +105,17 @@ impl Plan {
         let several = senders.into_iter().filter(|(_, nodes)| nodes.len() > 1);
         several.map(|(id, nodes)| (id, nodes.into_iter().collect())).collect()
     }
+}
+
+/// Refuses nodes whose heartbeat 1016h cannot monitor.
+fn check_consumes(node: NodeId, member: &Member) -> Result<(), PlanError> {
+    let why = |other: &u8| match NodeId::new(*other) {
+        None => Some(format!("consumes: {}", PlanError::NodeId(*other))),
+        Some(own) if own == node => Some(format!("consumes: {other} is the node itself")),
+        Some(_) => None,
+    };
+    let reason = member.consumes.keys().find_map(why);
+    reason.map_or(Ok(()), |reason| Err(PlanError::Value { node: node.get(), reason }))
 }
 
 /// Refuses a configuration file for another device than that of the data sheet, as far as both name one.

@@ -359,3 +359,33 @@ fn a_monitored_node_is_shown_with_its_time() {
     assert!(lines.starts_with("node 1: value: 1016h:1 "), "{lines}");
     assert!(lines.ends_with(" is off instead of node 5, 1000 ms\n"), "{lines}");
 }
+
+/// 1016h monitors nothing with such a node-ID (CiA 301, 7.5.2.19), and a node does not receive its own heartbeat.
+#[test]
+fn a_node_that_cannot_be_monitored_is_refused() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("consumes.yaml");
+    for (consumes, words) in [
+        ("0: 1000", "node 1: consumes: 0 is no node-ID, 1 to 127"),
+        ("5: 500, 128: 1000", "node 1: consumes: 128 is no node-ID, 1 to 127"),
+        ("255: 1000", "node 1: consumes: 255 is no node-ID, 1 to 127"),
+        ("1: 1000", "node 1: consumes: 1 is the node itself"),
+    ] {
+        fs::write(&file, format!("nodes:\n  - node: 1\n    consumes: {{ {consumes} }}\n")).unwrap();
+        for command in ["apply", "check"] {
+            let (code, text) = failed(&wire, &["net", command, file.to_str().unwrap()]);
+            assert_eq!((code, text.contains(words)), (7, true), "{text}");
+        }
+    }
+    assert!(printed(&wire, &["read", "1016:1"]).contains(" = 0 "));
+}
+
+/// Two values with one meaning are told as numbers.
+#[test]
+fn an_entry_of_1016h_that_is_off_differs_from_another_one_by_its_number() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("off.yaml");
+    fs::write(&file, "nodes:\n  - node: 1\n    consumes: { 5: 0 }\n").unwrap();
+    let (lines, _) = run(&wire, &["net", "check", file.to_str().unwrap()]);
+    assert!(lines.contains(" is 0 instead of 327680\n"), "{lines}");
+}

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::finding::{Finding, What, end, print};
 use super::senders::{Senders, listed};
 use super::{Failure, LISTEN, Session, catalogue, patience};
-use crate::configuration::{Configuration, looked_at};
+use crate::configuration::{Configuration, Difference, looked_at};
 use crate::net::{Date, Plan, PlannedNode, Start};
 use crate::object::{Place, at};
 use crate::scan::{Presence, scan};
@@ -108,15 +108,24 @@ fn compare(session: &mut Session, planned: &PlannedNode, findings: &mut Vec<Find
     let present = values(session, planned.node, &catalogue, &wanted)?;
     let is_wanted = |at: Multiplexer| wanted.values.contains_key(&(at.index, at.sub));
     for difference in wanted.differences(&present).into_iter().filter(|one| is_wanted(one.at)) {
-        let text = |value: &Option<Value>| {
-            value.as_ref().map_or("not there".to_owned(), |value| words(&catalogue, difference.at, value))
-        };
         let name = catalogue.name(difference.at).unwrap_or_default();
-        let (wanted, present) = (text(&difference.first), text(&difference.second));
+        let [wanted, present] = texts(&catalogue, &difference);
         let words = format!("{} {name} is {present} instead of {wanted}", Place(difference.at));
         findings.push(Finding::new(planned.node, What::Value, words));
     }
     Ok(())
+}
+
+/// The values of a difference in words; as they are where they have one meaning.
+fn texts(catalogue: &Catalogue, Difference { at, first, second }: &Difference) -> [String; 2] {
+    let text = |value: &Option<Value>, words: &dyn Fn(&Value) -> String| {
+        value.as_ref().map_or("not there".to_owned(), words)
+    };
+    let meanings = [first, second].map(|value| text(value, &|value| words(catalogue, *at, value)));
+    if meanings[0] == meanings[1] {
+        return [first, second].map(|value| text(value, &|value| visible(&value.to_string())));
+    }
+    meanings
 }
 
 /// A value in words: its meaning for an entry of 1016h, else the value itself.
