@@ -212,9 +212,10 @@ fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
 fn note_unclear(sheet: &Eds) {
     let count = sheet.entries().filter(|entry| is_unclear(entry)).count();
     if count > 0 {
+        let objects =
+            counted(count, "object that an RPDO can write is", "objects that an RPDO can write are");
         note(format_args!(
-            "{count} objects that an RPDO can write are left out: the data sheet does not say (ObjFlags) whether they \
-             are parameters or process values"
+            "{objects} left out: the data sheet does not say (ObjFlags) which are parameters and which process values"
         ));
     }
 }

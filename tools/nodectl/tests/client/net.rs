@@ -197,6 +197,25 @@ fn a_mistake_at_the_last_node_changes_no_node() {
     });
 }
 
+/// The command line is right: the file has the mistake, also where the identity of the node decides on its data sheet.
+#[test]
+fn a_mistake_of_the_file_is_7_in_every_command() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("mistake.yaml");
+    for (lines, words) in [
+        ("heartbeat: 500\n    values: { 1017: 600 }", "the file sets it twice"),
+        ("values: { 5FFF: 1 }", "5FFFh:0 is no object"),
+        ("values: { 1017: 1000.5 }", "is not a whole number"),
+    ] {
+        fs::write(&file, format!("nodes:\n  - node: 1\n    {lines}\n")).unwrap();
+        for command in ["check", "apply"] {
+            let (code, text) = failed(&wire, &["net", command, file.to_str().unwrap()]);
+            let is_named = text.contains("mistake.yaml: node 1: ") && text.contains(words);
+            assert_eq!((code, is_named), (7, true), "{command}: {text}");
+        }
+    }
+}
+
 #[test]
 fn an_object_is_set_once() {
     let wire = Wire::new(devices(1));
