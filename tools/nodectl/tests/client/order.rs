@@ -162,3 +162,47 @@ fn every_cob_id_of_a_service_is_applied() {
         assert_eq!(lines, "node 5: 1 change, read back\n", "{object}");
     }
 }
+
+/// The description of a sensor is checked against the scaling (6000h to 6002h), and the scaling against the description.
+#[test]
+fn encoders_with_other_sensors_and_a_scaling_are_applied() {
+    let settings: [&[(&str, &str)]; 4] = [
+        &[
+            ("2100:1", "2"),
+            ("2103:1", "12"),
+            ("2103:2", "13"),
+            ("6001", "3600"),
+            ("6002", "36000"),
+            ("6000", "4"),
+        ],
+        &[("2100:1", "1"), ("2103:1", "0"), ("2103:2", "8"), ("6001", "256"), ("6002", "256"), ("6000", "4")],
+        &[
+            ("2100:1", "2"),
+            ("2103:1", "4"),
+            ("2103:2", "20"),
+            ("6001", "1000000"),
+            ("6002", "16000000"),
+            ("6000", "5"),
+        ],
+        &[
+            ("2100:1", "5"),
+            ("2101:1", "400"),
+            ("2102:1", "100"),
+            ("6001", "400"),
+            ("6002", "40000"),
+            ("6000", "4"),
+        ],
+    ];
+    for (number, first) in settings.into_iter().enumerate() {
+        for second in settings.into_iter().filter(|second| *second != first) {
+            let node = || Wire::new(Pressure::of(node::Personality::Encoder, 5));
+            let (from, to) = (node(), node());
+            for (wire, values) in [(&from, first), (&to, second)] {
+                write(wire, values);
+                printed(wire, &["save", "-n", "5"]);
+                printed(wire, &["nmt", "reset", "-n", "5"]);
+            }
+            clone_and_back(&format!("scaling-{number}"), &from, &to);
+        }
+    }
+}
