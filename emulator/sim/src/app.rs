@@ -180,7 +180,7 @@ impl App {
             self.obey(command);
         }
         while let Some(line) = self.commands.as_ref().and_then(|lines| lines.try_recv().ok()) {
-            match console::parse(&line) {
+            match console::parse(&line, &[]) {
                 Some(Ok(command)) => self.obey(command),
                 Some(Err(error)) => self.display.say(error),
                 None => {}

@@ -15,21 +15,23 @@ pub enum Command {
     Quit,
 }
 
-/// The syntax of the commands.
-pub fn help() -> String {
-    format!("commands: {} [ID=]SPEC, e.g. pressure 1=const:300000; quit", KINDS.join("|"))
+/// The syntax of the commands; `more` are those that only this input has.
+pub fn help(more: &[&str]) -> String {
+    let more: String = more.iter().map(|word| format!("{word}; ")).collect();
+    format!("commands: {} [ID=]SPEC, e.g. pressure 1=const:300000; {more}quit", KINDS.join("|"))
 }
 
-/// Parses one line; `None` for an empty line.
-pub fn parse(line: &str) -> Option<Result<Command, String>> {
+/// Parses one line; `None` for an empty line. `more` are commands that the caller processes.
+pub fn parse(line: &str, more: &[&str]) -> Option<Result<Command, String>> {
     let line = line.trim();
     let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     Some(match word {
         "" => return None,
         "quit" if rest.is_empty() => Ok(Command::Quit),
-        "help" => Err(help()),
+        "help" => Err(help(more)),
         kind if KINDS.contains(&kind) => Stimulus::parse(kind, rest.trim()).map(Command::Stimulus),
-        _ => Err(format!("{word:?} is no command; {}", help())),
+        _ if word == "quit" || more.contains(&word) => Err(format!("{word:?} has no argument")),
+        _ => Err(format!("{word:?} is no command; {}", help(more))),
     })
 }
 
@@ -53,6 +55,7 @@ mod tests {
 
     #[test]
     fn commands_are_read_and_other_lines_are_rejected() {
+        let parse = |line| parse(line, &[]);
         assert_eq!(parse("  "), None);
         assert_eq!(parse(" quit "), Some(Ok(Command::Quit)));
         let Some(Ok(Command::Stimulus(stimulus))) = parse("pressure 1=const:300000") else { panic!() };

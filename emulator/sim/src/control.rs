@@ -112,7 +112,7 @@ fn obey(line: &str, world: &mut World, quit: &mut bool) -> Option<Answer> {
         line if line.contains("csv:") => {
             Answer::Line(json!({ "error": "csv: is for the command line of the simulator" }))
         }
-        line => match console::parse(line)? {
+        line => match console::parse(line, &["boards", "watch"])? {
             Ok(Command::Quit) => {
                 *quit = true;
                 done()

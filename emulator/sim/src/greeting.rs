@@ -63,7 +63,7 @@ impl Greeting<'_> {
         if options.flash.is_some() {
             lines.extend(boards.iter().map(programs));
         }
-        lines.push(console::help());
+        lines.push(console::help(&[]));
         lines
     }
 

@@ -45,7 +45,7 @@ impl Stimulus {
             "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
             "temperature" => in_kelvin(text).map(|spec| spec.map(Stimulus::Temperature)),
             "thermistor" => in_kelvin(text).map(|spec| spec.map(Stimulus::Thermistor)),
-            "supply" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Supply)),
+            "supply" => in_volts(text).map(|spec| spec.map(Stimulus::Supply)),
             "power" => {
                 text.parse().map(|spec: Targeted<Power>| spec.map(|Power(signal)| Stimulus::Supply(signal)))
             }
@@ -225,6 +225,15 @@ fn in_kelvin(text: &str) -> Result<Targeted<Signal>, String> {
     Ok(spec)
 }
 
+/// The highest supply that the chip survives (data sheet, absolute maximum ratings), in V.
+const HIGHEST_SUPPLY: f64 = 4.0;
+
+fn in_volts(text: &str) -> Result<Targeted<Signal>, String> {
+    let spec: Targeted<Signal> = text.parse()?;
+    let is_possible = spec.what.lowest() >= 0.0 && spec.what.highest() <= HIGHEST_SUPPLY;
+    if is_possible { Ok(spec) } else { Err(format!("`{text}` is no supply of 0 to {HIGHEST_SUPPLY} V")) }
+}
+
 /// A value for one node, written `ID=SPEC`, or for all nodes, written `SPEC`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Targeted<T> {
@@ -278,6 +287,17 @@ mod tests {
             assert!(Stimulus::parse(kind, "const:298.15").is_ok());
         }
         assert!(Stimulus::parse("pressure", "const:25").is_ok());
+    }
+
+    #[test]
+    fn a_supply_that_no_chip_survives_is_refused() {
+        for text in ["const:-1", "const:100", "ramp:3.3,4.5,1", "sine:3,2,1", "step:5,3,1", "noise:4.1,0.1"] {
+            let refused = Stimulus::parse("supply", text).unwrap_err();
+            assert!(refused.contains("0 to 4 V"), "{text}: {refused}");
+        }
+        for text in ["const:0", "const:4", "ramp:3.3,1.5,0.7", "noise:3.3,0.1"] {
+            assert!(Stimulus::parse("supply", text).is_ok(), "{text}");
+        }
     }
 
     #[test]

@@ -67,7 +67,11 @@ fn a_line_is_a_command_and_a_line_the_answer() {
         ("temperature const:25", "temperatures are in K"),
         ("fault 1=open-sensor", "NAME:on"),
         ("fault broken:on", "unknown fault `broken`"),
-        ("fly", "no command"),
+        ("fly", "boards; watch; quit"),
+        ("boards x", "\"boards\" has no argument"),
+        ("watch 1", "\"watch\" has no argument"),
+        ("quit now", "\"quit\" has no argument"),
+        ("supply const:5", "0 to 4 V"),
     ] {
         let answer = bench.ask(&mut client, line).unwrap();
         assert!(answer["error"].as_str().unwrap().contains(words), "{line}: {answer}");

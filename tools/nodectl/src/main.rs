@@ -27,12 +27,16 @@ fn main() -> ExitCode {
 fn usage(error: &clap::Error) -> ExitCode {
     let wants_json = std::env::args_os().any(|argument| argument == "--json");
     if wants_json && error.use_stderr() {
-        let text = error.to_string();
-        let reason = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-        report(&Failure::Usage(reason.to_owned()), true);
+        report(&Failure::Usage(reason(&error.to_string())), true);
         return ExitCode::from(2);
     }
     error.exit()
+}
+
+/// The error in one line: the lines before the hints and the usage, some of which name the arguments.
+fn reason(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
 }
 
 fn report(failure: &Failure, json: bool) {

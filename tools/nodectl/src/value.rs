@@ -58,7 +58,7 @@ impl Value {
 
     /// Reads a value of a data type.
     ///
-    /// Integers are decimal, or hexadecimal after `0x`. Bytes are pairs of hexadecimal digits, with or without spaces.
+    /// Integers are decimal, or hexadecimal after `0x`; a real number can be its bits, all digits after `0x`. Bytes are pairs of hexadecimal digits, with or without spaces.
     /// Integers of more than 32 bits can also be written as their bytes in the order of the wire, with spaces, because
     /// profiles use them for structures.
     ///
@@ -70,8 +70,7 @@ impl Value {
             Class::Unsigned(1) => boolean(text),
             Class::Unsigned(bits @ 33..) => structure(text, bits),
             Class::Unsigned(bits) => integer(text, 0, (1 << bits) - 1),
-            Class::Real(32) => text.trim().parse().ok().map(Value::Real32),
-            Class::Real(_) => text.trim().parse().ok().map(Value::Real64),
+            Class::Real(bits) => real(text.trim(), bits),
             Class::Text => Some(Value::Text(text.to_owned())),
             Class::Bytes => hex_bytes(text).map(Value::Bytes),
         };
@@ -175,6 +174,29 @@ fn integer(text: &str, low: i128, high: i128) -> Option<Value> {
     (low..=high).contains(&value).then_some(Value::Integer(value))
 }
 
+/// A number with a fraction, or its bits: all digits after 0x. A number that the type does not have, which would become
+/// infinity or 0, is refused.
+fn real(text: &str, bits: u8) -> Option<Value> {
+    let lower = text.to_ascii_lowercase();
+    if let Some(digits) = lower.strip_prefix("0x") {
+        let is_whole = digits.len() == usize::from(bits / 4) && !digits.starts_with('+');
+        let pattern = u64::from_str_radix(digits, 16).ok().filter(|_| is_whole)?;
+        return Some(match bits {
+            32 => Value::Real32(f32::from_bits(u32::try_from(pattern).ok()?)),
+            _ => Value::Real64(f64::from_bits(pattern)),
+        });
+    }
+    let value =
+        if bits == 32 { Value::Real32(text.parse().ok()?) } else { Value::Real64(text.parse().ok()?) };
+    let number = value.as_f64()?;
+    // `inf` and `nan` have an n.
+    let is_named = lower.contains('n');
+    let mantissa = lower.split('e').next().unwrap_or_default();
+    let is_zero = !mantissa.bytes().any(|byte| matches!(byte, b'1'..=b'9'));
+    let fits = number.is_finite() && (number != 0.0 || is_zero);
+    (is_named || fits).then_some(value)
+}
+
 /// An integer of more than 32 bits: a number, or bytes with spaces. Digits with a leading zero are neither: they look
 /// like bytes, and would be a decimal number.
 fn structure(text: &str, bits: u8) -> Option<Value> {
@@ -204,7 +226,9 @@ fn expected(data_type: DataType) -> String {
             usize::from(bits).div_ceil(8)
         ),
         Class::Unsigned(bits) => format!("a whole number from 0 to {}", (1_i128 << bits) - 1),
-        Class::Real(_) => "a number".to_owned(),
+        Class::Real(bits) => {
+            format!("a number of {data_type}, or its {} hexadecimal digits after 0x", bits / 4)
+        }
         Class::Text => "text".to_owned(),
         Class::Bytes => "pairs of hexadecimal digits".to_owned(),
     }

@@ -97,8 +97,53 @@ fn limits_are_part_of_the_error() {
     assert_eq!(message("256", "u8"), "\"256\" is not a whole number from 0 to 255");
     assert_eq!(message("-32769", "i16"), "\"-32769\" is not a whole number from -32768 to 32767");
     assert_eq!(message("2", "b"), "\"2\" is not true or false");
-    assert_eq!(message("0x1", "r32"), "\"0x1\" is not a number");
+    assert_eq!(
+        message("0x1", "r32"),
+        "\"0x1\" is not a number of REAL32, or its 8 hexadecimal digits after 0x"
+    );
     assert_eq!(message("ABC", "d"), "\"ABC\" is not pairs of hexadecimal digits");
+}
+
+/// A number that its type does not have would become infinity or 0.
+#[test]
+fn a_real_number_is_checked_and_can_be_its_bits() {
+    let parsed = |text, name| {
+        let data_type = data_type(name).expect("a type");
+        Value::parse(text, data_type).ok().map(|value| value.encode(data_type))
+    };
+    for (text, number) in [
+        ("0x3FC00000", 1.5),
+        ("0X3fc00000", 1.5),
+        ("0x7F800000", f32::INFINITY),
+        ("1e38", 1e38),
+        ("0.0000", 0.0),
+        ("-0e5", -0.0),
+        ("1e-45", 1e-45),
+        ("inf", f32::INFINITY),
+        ("-infinity", f32::NEG_INFINITY),
+    ] {
+        assert_eq!(parsed(text, "r32"), Some(number.to_le_bytes().to_vec()), "{text}");
+    }
+    for text in [
+        "1e39",
+        "-1e39",
+        "1e400",
+        "1e-50",
+        "0.5e-400",
+        "0x10",
+        "0x3FC000000",
+        "0x+FC00000",
+        "-0x3FC00000",
+        "1.5 bar",
+        "",
+    ] {
+        assert_eq!(parsed(text, "r32"), None, "{text}");
+    }
+    assert_eq!(parsed("0x3FF8000000000000", "r64"), Some(1.5_f64.to_le_bytes().to_vec()));
+    assert_eq!(parsed("1e39", "r64"), Some(1e39_f64.to_le_bytes().to_vec()));
+    for text in ["1e400", "1e-400", "0x3FC00000"] {
+        assert_eq!(parsed(text, "r64"), None, "{text}");
+    }
 }
 
 #[test]

@@ -22,13 +22,14 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a regular file of text of at most `most` bytes.
+/// Reads a regular file of text of at most `most` bytes, without the byte order mark that some editors begin with.
 ///
 /// # Errors
 /// As [`read`]; the file is no UTF-8.
 pub fn read_to_string(path: &Path, most: u64) -> io::Result<String> {
     let text = String::from_utf8(read(path, most)?);
-    text.map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is no text (UTF-8)"))
+    let text = text.map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is no text (UTF-8)"))?;
+    Ok(text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text))
 }
 
 #[cfg(test)]
@@ -53,6 +54,15 @@ mod tests {
         assert!(read(&folder, 7).is_err(), "a directory");
         std::fs::write(&path, [0xFF]).unwrap();
         assert!(read_to_string(&path, 9).is_err());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_text() {
+        let folder = folder("mark");
+        let path = folder.join("file");
+        std::fs::write(&path, "\u{FEFF}time,value\n").unwrap();
+        assert_eq!(read_to_string(&path, 99).unwrap(), "time,value\n");
         std::fs::remove_dir_all(folder).unwrap();
     }
 

@@ -70,12 +70,21 @@ impl Signal {
 impl Signal {
     /// The lowest value of the signal; noise does not count.
     pub fn lowest(&self) -> f64 {
+        self.ends().0
+    }
+
+    /// The highest value of the signal; noise does not count.
+    pub fn highest(&self) -> f64 {
+        self.ends().1
+    }
+
+    fn ends(&self) -> (f64, f64) {
         match self {
-            Signal::Constant(value) => *value,
-            Signal::Sine { offset, amplitude, .. } => offset - amplitude.abs(),
-            Signal::Ramp { from, to, .. } | Signal::Step { from, to, .. } => from.min(*to),
-            Signal::Noise { mean, .. } => *mean,
-            Signal::Table(table) => table.lowest(),
+            Signal::Constant(value) => (*value, *value),
+            Signal::Sine { offset, amplitude, .. } => (offset - amplitude.abs(), offset + amplitude.abs()),
+            Signal::Ramp { from, to, .. } | Signal::Step { from, to, .. } => (from.min(*to), from.max(*to)),
+            Signal::Noise { mean, .. } => (*mean, *mean),
+            Signal::Table(table) => table.ends(),
         }
     }
 }

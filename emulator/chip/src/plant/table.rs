@@ -63,9 +63,11 @@ impl Table {
         Self::parse(&name, &text)
     }
 
-    /// The lowest of the points.
-    pub(super) fn lowest(&self) -> f64 {
-        self.points.iter().map(|&(_, value)| value).fold(f64::INFINITY, f64::min)
+    /// The lowest and the highest of the points.
+    pub(super) fn ends(&self) -> (f64, f64) {
+        let values = self.points.iter().map(|&(_, value)| value);
+        values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
     }
 
     fn parse(path: &str, text: &str) -> Result<Self, TableError> {

@@ -47,7 +47,7 @@ pub struct SsiFormatError(String);
 impl FromStr for SsiFormat {
     type Err = SsiFormatError;
 
-    /// `TURNS+STEPS[,gray|binary][,error][,even|odd]`.
+    /// `TURNS+STEPS[,gray|binary][,error][,even|odd]`, each property once.
     fn from_str(text: &str) -> Result<Self, SsiFormatError> {
         let wrong = || SsiFormatError(text.to_owned());
         let mut parts = text.split(',').map(str::trim);
@@ -57,13 +57,21 @@ impl FromStr for SsiFormat {
         let is_possible = (1..=31).contains(&single_turn) && multi_turn <= 32 - single_turn;
         let plain = Self { single_turn, multi_turn, error_bit: false, parity: None, ..Self::default() };
         let start = is_possible.then_some(plain).ok_or_else(wrong)?;
-        parts.try_fold(start, |format, part| match part {
-            "gray" => Ok(Self { gray: true, ..format }),
-            "binary" => Ok(Self { gray: false, ..format }),
-            "error" => Ok(Self { error_bit: true, ..format }),
-            "even" => Ok(Self { parity: Some(Parity::Even), ..format }),
-            "odd" => Ok(Self { parity: Some(Parity::Odd), ..format }),
-            _ => Err(wrong()),
+        let mut given = Vec::new();
+        parts.try_fold(start, |format, part| {
+            let (property, format) = match part {
+                "gray" => ("coding", Self { gray: true, ..format }),
+                "binary" => ("coding", Self { gray: false, ..format }),
+                "error" => ("error", Self { error_bit: true, ..format }),
+                "even" => ("parity", Self { parity: Some(Parity::Even), ..format }),
+                "odd" => ("parity", Self { parity: Some(Parity::Odd), ..format }),
+                _ => return Err(wrong()),
+            };
+            if given.contains(&property) {
+                return Err(wrong());
+            }
+            given.push(property);
+            Ok(format)
         })
     }
 }
@@ -187,6 +195,18 @@ mod tests {
         assert_eq!(word >> 31, 1, "the rest level");
         assert_eq!(word >> 6 & 0x1FF_FFFF, 5 << 13 | 2048);
         assert_eq!(word & 0x3F, 0, "low after the word");
+    }
+
+    #[test]
+    fn a_format_has_each_property_once() {
+        for text in
+            ["12+13,gray,binary", "12+13,gray,gray", "12+13,error,error", "12+13,even,odd", "12+13,odd,odd"]
+        {
+            assert!(text.parse::<SsiFormat>().is_err(), "{text}");
+        }
+        for text in ["12+13", "12+13,odd", "0+8,binary,error,even", "12+13,error,gray"] {
+            assert!(text.parse::<SsiFormat>().is_ok(), "{text}");
+        }
     }
 
     #[test]

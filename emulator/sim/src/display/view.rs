@@ -90,7 +90,7 @@ impl View {
 
     fn on_enter(&mut self) -> Option<Command> {
         let line = std::mem::take(&mut self.input);
-        let command = console::parse(&line)?;
+        let command = console::parse(&line, &[])?;
         self.log(format!("> {line}"));
         command.map_err(|error| self.log(error)).ok()
     }

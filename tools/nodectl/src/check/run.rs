@@ -3,13 +3,12 @@
 use canopen::nmt::{Command, State};
 use canopen::{Duration, NodeId};
 
-use super::subject::{Refusal, ensure};
+use super::subject::{Refusal, Values, ensure, fail, skip};
 use super::{Check, Effect, Level, Outcome, Stop, Subject, Verdict};
 use crate::Logged;
 use crate::bus::BusError;
-use crate::configuration::{Configuration, is_parameter, plan};
-use crate::object::Place;
-use crate::value::Value;
+use crate::configuration::is_parameter;
+use crate::object::{Place, at};
 
 /// The number of frames that are kept of a check that did not pass. The last frames are kept, because they show the
 /// deviation.
@@ -70,6 +69,7 @@ impl Run {
 /// # Errors
 /// The device does not answer at all, or the bus is lost.
 pub fn run(subject: &mut Subject<'_>, options: &Options, mut progress: impl FnMut(&Result)) -> Outcome<Run> {
+    subject.may_store = options.allowed >= Effect::Stores;
     let before = subject.begin()?;
     let mut results = Vec::new();
     for check in &options.checks {
@@ -136,7 +136,7 @@ fn verdict(outcome: Outcome, level: Level) -> std::result::Result<Verdict, BusEr
 struct Before {
     /// `None` where no heartbeat has told the state.
     state: Option<State>,
-    configuration: Configuration,
+    values: Values,
 }
 
 impl Subject<'_> {
@@ -147,7 +147,7 @@ impl Subject<'_> {
         let state = self.present_state()?;
         self.tidy()?;
         self.answer([0x40, 0x00, 0x10, 0, 0, 0, 0, 0])?;
-        Ok(Before { state, configuration: self.configuration()? })
+        Ok(Before { state, values: self.parameters()? })
     }
 
     /// The NMT state that a heartbeat tells. For a device without a heartbeat, the heartbeat is switched on for a
@@ -182,12 +182,13 @@ impl Subject<'_> {
         Ok(())
     }
 
-    fn configuration(&mut self) -> Outcome<Configuration> {
-        let Ok(sheet) = self.sheet() else { return Ok(Configuration::default()) };
-        let mut values = Configuration::default();
+    /// The values of the parameters that the data sheet has.
+    fn parameters(&mut self) -> Outcome<Values> {
+        let Ok(sheet) = self.sheet() else { return Ok(Values::new()) };
+        let mut values = Values::new();
         for entry in sheet.entries().filter(|entry| is_parameter(entry)) {
             if let Ok(bytes) = self.try_read(entry.index, entry.sub).unwrap_or(Err(Refusal(0))) {
-                values.values.insert((entry.index, entry.sub), Value::decode(&bytes, entry.data_type));
+                values.insert((entry.index, entry.sub), bytes);
             }
         }
         Ok(values)
@@ -197,7 +198,7 @@ impl Subject<'_> {
     /// back.
     fn end(&mut self, before: &Before) -> Outcome<Vec<String>> {
         self.tidy()?;
-        let left = self.apply(&before.configuration)?;
+        let left = self.restore(&before.values)?;
         if let Some(state @ (State::Operational | State::Stopped)) = before.state {
             self.enter(state)?;
         }
@@ -205,22 +206,45 @@ impl Subject<'_> {
         Ok(left)
     }
 
-    /// Writes the values that differ from a configuration. Returns the values that the device does not take.
-    fn apply(&mut self, wanted: &Configuration) -> Outcome<Vec<String>> {
-        let mut left = Vec::new();
-        let Ok(sheet) = self.sheet() else { return Ok(left) };
-        let now = self.configuration()?;
-        for write in plan(&now, wanted) {
-            let Some(entry) = sheet.get(write.at.index, write.at.sub) else { continue };
-            let bytes = write.value.encode(entry.data_type);
-            match self.try_write(write.at.index, write.at.sub, &bytes) {
-                Ok(Ok(())) => (),
-                Ok(Err(refusal)) => left.push(format!("{}: {refusal}", Place(write.at))),
-                Err(Stop::Bus(error)) => return Err(error.into()),
-                Err(_) => left.push(format!("{}: no correct answer", Place(write.at))),
+    /// Writes the parameters that differ. Returns those that the device does not take, and all that differ if a transfer
+    /// fails.
+    fn restore(&mut self, wanted: &Values) -> Outcome<Vec<String>> {
+        let now = self.parameters()?;
+        let differs = |(key, bytes): &(&(u16, u8), &Vec<u8>)| now.get(*key) != Some(*bytes);
+        let different: Values =
+            wanted.iter().filter(differs).map(|(key, bytes)| (*key, bytes.clone())).collect();
+        match self.bring(&different) {
+            Ok(left) => Ok(left),
+            Err(Stop::Bus(error)) => Err(error.into()),
+            Err(_) => {
+                let places = different.keys().map(|key| Place(at(key.0, key.1)));
+                Ok(places.map(|place| format!("{place}: no correct answer")).collect())
             }
         }
-        Ok(left)
+    }
+
+    /// Runs a function that judges a default. If the user has given the object another value, the defaults are restored
+    /// first, which the user has to allow.
+    pub(super) fn with_default_of(
+        &mut self,
+        (index, sub): (u16, u8),
+        default: u32,
+        does: impl FnOnce(&mut Self) -> Outcome,
+    ) -> Outcome {
+        if self.number(index, sub)? == default {
+            return does(self);
+        }
+        if !self.may_store {
+            let place = Place(at(index, sub));
+            return Err(skip(format!(
+                "{place} has another value, and restoring its default was not allowed (--yes)"
+            )));
+        }
+        match self.with_defaults(does) {
+            // A device that cannot restore its defaults has this value.
+            Err(Stop::Skipped(reason)) => Err(fail(format!("the default {default:X}h"), reason)),
+            outcome => outcome,
+        }
     }
 
     /// Runs a function while the device has its default values. Restores and saves the values that were saved before.
@@ -229,7 +253,7 @@ impl Subject<'_> {
         self.need(0x1010, 1)?;
         self.need(0x1011, 1)?;
         self.reset(Command::ResetNode)?;
-        let saved = self.configuration()?;
+        let saved = self.parameters()?;
         self.write(0x1011, 1, b"load")?;
         self.reset(Command::ResetNode)?;
         let kept = self.written.len();
@@ -238,12 +262,13 @@ impl Subject<'_> {
         // below.
         self.written.truncate(kept);
         self.tidy()?;
-        let has_changed = !saved.differences(&self.configuration()?).is_empty();
-        let left = self.apply(&saved)?;
-        ensure(left.is_empty(), "the saved values are taken back", left.join(", "))?;
+        let has_changed = saved != self.parameters()?;
+        let left = self.restore(&saved)?;
+        // What the device has taken back is saved, even if it refuses the rest.
         if has_changed {
             self.write(0x1010, 1, b"save")?;
         }
+        ensure(left.is_empty(), "the saved values are taken back", left.join(", "))?;
         done
     }
 }

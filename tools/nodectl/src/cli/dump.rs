@@ -13,9 +13,10 @@ use serde::{Serialize, Serializer};
 use super::read::place;
 use super::replacement::Replacement;
 use super::session::loss;
+use super::sheets::misfit;
 use super::store::{Group, Order, sign};
 use super::{Failure, Session};
-use crate::configuration::{Configuration, Difference, Write, is_unclear, node_of, plan};
+use crate::configuration::{Configuration, Dcf, Difference, Write, is_unclear, node_of, plan};
 use crate::object::{Place, at};
 use crate::sdo::AbortCode;
 use crate::text::{counted, note, visible};
@@ -61,7 +62,7 @@ pub(super) struct Apply {
     #[arg(long)]
     save: bool,
 
-    /// Write also a file for another product, and one with missing parts or values that cannot be read.
+    /// Write also a file for another product or vendor, and one with missing parts or values that cannot be read.
     #[arg(long)]
     force: bool,
 }
@@ -98,17 +99,15 @@ impl Dump {
         let sheet = session.sheet_of(node)?;
         note_unclear(&sheet);
         let values = session.configuration(node, &sheet)?;
-        let mut file = values.to_sheet(&sheet, node, self.all);
-        let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
-        file.commissioning =
-            Some(Commissioning { node_id: node.get(), bit_rate: session.options.known_bit_rate(), serial });
+        let commissioning = commissioning(session, node)?;
         let name = self.file.file_name().and_then(|name| name.to_str()).unwrap_or("-");
         let reals = if self.bits { Reals::Bits } else { Reals::Decimal };
-        let text = file.to_dcf(name, reals);
+        let dcf = values.to_dcf(&sheet, name, commissioning, self.all, reals);
+        note_left_out(&sheet, &dcf);
         if self.file.as_os_str() == "-" {
-            return Ok(session.output.write(text.as_bytes())?);
+            return Ok(session.output.write(dcf.text.as_bytes())?);
         }
-        Replacement::write(&self.file, text.as_bytes())
+        Replacement::write(&self.file, dcf.text.as_bytes())
     }
 }
 
@@ -167,7 +166,7 @@ impl Apply {
         }
         let refusal = match loss(sheet) {
             Some(words) => Some(words),
-            None => mismatch(session, node, sheet)?.map(|words| format!("it is {words}")),
+            None => mismatch(session, node, sheet)?,
         };
         refusal.map_or(Ok(()), |words| Err(Failure::file(&self.file, words)))
     }
@@ -178,6 +177,25 @@ fn print(session: &mut Session, sheet: &Eds, differences: Vec<Difference>) -> Re
         let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry));
         session.print(&Changed { at, name, first, second })
     })
+}
+
+/// The device that a configuration file is for.
+pub(super) fn commissioning(session: &mut Session, node: NodeId) -> Result<Commissioning, Failure> {
+    let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
+    Ok(Commissioning { node_id: node.get(), bit_rate: session.options.known_bit_rate(), serial })
+}
+
+/// Names the parameters whose values a file cannot have.
+pub(super) fn note_left_out(sheet: &Eds, dcf: &Dcf) {
+    for at in &dcf.left_out {
+        let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry)).unwrap_or_default();
+        note(format_args!(
+            "warning: {} {} is left out: a file cannot have an empty value, a line break, spaces at the ends or a \
+             comment (\" ;\") in a text",
+            Place(*at),
+            visible(&name)
+        ));
+    }
 }
 
 /// Warns the user of a file of another node-ID.
@@ -194,20 +212,21 @@ fn note_node_id(sheet: &Eds, node: NodeId, done: &str) {
 fn note_unclear(sheet: &Eds) {
     let count = sheet.entries().filter(|entry| is_unclear(entry)).count();
     if count > 0 {
+        let objects =
+            counted(count, "object that an RPDO can write is", "objects that an RPDO can write are");
         note(format_args!(
-            "{count} objects that an RPDO can write are left out: the data sheet does not say (ObjFlags) whether they \
-             are parameters or process values"
+            "{objects} left out: the data sheet does not say (ObjFlags) which are parameters and which process values"
         ));
     }
 }
 
 /// Why a file does not fit a node. A node would refuse the file of another product object by object, so nothing is
-/// written then.
+/// written then. A product code is unique only together with the vendor-ID.
 pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Result<Option<String>, Failure> {
-    let device = session.word(node, at(0x1018, 2))?.unwrap_or(0);
-    let product = sheet.device.product_number;
-    let words = || format!("for product {product:08X}h, and the node is product {device:08X}h");
-    Ok((device != product).then(words))
+    let device = (session.word(node, at(0x1018, 1))?, session.word(node, at(0x1018, 2))?);
+    let of_file = (sheet.device.vendor_number, sheet.device.product_number);
+    let is_same = (device.0.unwrap_or(0), device.1.unwrap_or(0)) == of_file;
+    Ok((!is_same).then(|| misfit(sheet, device)))
 }
 
 /// Writes the parameters that differ from the wanted ones, until `read` shows no difference. Returns the number of

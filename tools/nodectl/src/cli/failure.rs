@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use crate::acquisition::Interruption;
 use crate::bus::BusError;
+use crate::net::PlanError;
 use crate::object::Place;
 use crate::sdo::{self, Cause};
 use crate::text::counted;
@@ -101,6 +102,9 @@ pub enum Failure {
     /// A node has not answered.
     #[error("{0}")]
     Silence(String),
+    /// The file of a network has a mistake.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     /// A file cannot be read or written.
     #[error("{path}: {reason}")]
     File {
@@ -162,7 +166,7 @@ impl Failure {
             Failure::Nodes { exit_code, .. }
             | Failure::Objects { exit_code, .. }
             | Failure::LeftOut { exit_code, .. } => *exit_code,
-            Failure::File { .. } | Failure::Output(_) => 7,
+            Failure::Plan(_) | Failure::File { .. } | Failure::Output(_) => 7,
         }
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use canopen::Duration;
 use clap::Args;
+use wire::slcan::BIT_RATES;
 
 use super::Failure;
 use super::node_set::NodeSet;
@@ -20,7 +21,7 @@ pub struct Options {
     pub bus: Address,
 
     /// Bit rate in kbit/s, for slcan adapters and for the files of `dump`. Without it, an slcan adapter gets 250.
-    #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S")]
+    #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S", value_parser = parse_bit_rate)]
     pub bit_rate: Option<u16>,
 
     /// Node-ID, for read, update and info several (1,2,5-8), for nmt also "all".
@@ -51,6 +52,12 @@ pub struct Options {
     /// File with the key that authorises updates, for nodes that demand one: 64 hexadecimal digits.
     #[arg(long, global = true, env = "NODECTL_AUTHORISATION_KEY", value_name = "FILE")]
     pub authorisation_key: Option<PathBuf>,
+}
+
+/// A bit rate of CANopen or of slcan.
+fn parse_bit_rate(text: &str) -> Result<u16, String> {
+    let rate = text.trim().parse().ok().filter(|rate| BIT_RATES.contains(rate));
+    rate.ok_or_else(|| format!("\"{text}\" is no bit rate of CAN in kbit/s, {BIT_RATES:?}"))
 }
 
 /// The bit rate of an slcan adapter without `--bit-rate`, in kbit/s.

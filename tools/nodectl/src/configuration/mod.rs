@@ -1,7 +1,9 @@
 //! The configuration of a device: the values of all parameters, from the device itself or from a file (CiA 306).
 
 mod cob_id;
+mod file;
 mod plan;
+mod services;
 
 use std::collections::BTreeMap;
 
@@ -13,7 +15,8 @@ use crate::object::at;
 use crate::sdo::Error;
 use crate::value::Value;
 
-pub use plan::{Write, plan};
+pub use file::Dcf;
+pub use plan::{Write, looked_at, plan};
 
 /// Values by index and sub-index.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -94,7 +97,7 @@ impl Configuration {
             progress(number, parameters.len());
             match read(at(entry.index, entry.sub)) {
                 Ok(bytes) => {
-                    values.insert((entry.index, entry.sub), Value::decode(&bytes, entry.data_type));
+                    values.insert((entry.index, entry.sub), faithful(&bytes, entry.data_type));
                 }
                 Err(error) if error.abort().is_some() => (),
                 Err(error) => return Err(error),
@@ -128,26 +131,22 @@ impl Configuration {
         differences.retain(|difference| difference.second.is_some());
         differences
     }
-
-    /// The data sheet with values: the values that differ from the defaults, or all values.
-    #[must_use]
-    pub fn to_sheet(&self, sheet: &Eds, node: NodeId, all: bool) -> Eds {
-        let (mut file, defaults) = (sheet.clone(), Configuration::of_sheet(sheet, node));
-        for entry in file.objects.values_mut().flat_map(|object| object.entries.values_mut()) {
-            let key = (entry.index, entry.sub);
-            let value = self.values.get(&key);
-            let is_wanted = all || !same(value, defaults.values.get(&key));
-            let formula = |value| cob_id::formula(entry, value, node).or_else(|| encode(value));
-            entry.value = value.filter(|_| is_wanted).and_then(formula);
-        }
-        file
-    }
 }
 
 /// The node-ID that a file is for.
 #[must_use]
 pub fn node_of(sheet: &Eds) -> Option<NodeId> {
     sheet.commissioning.as_ref().and_then(|to| NodeId::new(to.node_id))
+}
+
+/// The value in these bytes, which stay bytes where a text does not have all of them, as with Latin-1. Zeros behind a text
+/// only pad it.
+fn faithful(bytes: &[u8], data_type: eds::DataType) -> Value {
+    let value = Value::decode(bytes, data_type);
+    let Value::Text(_) = value else { return value };
+    let rest = bytes.strip_prefix(value.encode(data_type).as_slice());
+    let has_all = rest.is_some_and(|rest| rest.iter().all(|byte| *byte == 0));
+    if has_all { value } else { Value::Bytes(bytes.to_vec()) }
 }
 
 /// Whether two values are equal. NaN is equal to NaN.
@@ -167,17 +166,4 @@ fn decode(formula: &Formula, entry: &Entry, node: NodeId) -> Option<Value> {
         (eds::Value::Text(text), Class::Text) => Value::Text(text),
         (eds::Value::Text(text), _) => return Value::parse(&text, entry.data_type).ok(),
     })
-}
-
-/// The value in the form of a file; `None` for a text with a line break.
-fn encode(value: &Value) -> Option<Formula> {
-    let value = match value {
-        Value::Integer(value) | Value::Decimal(value, _) => eds::Value::Integer(*value),
-        Value::Real32(value) => eds::Value::Real(f64::from(*value)),
-        Value::Real64(value) => eds::Value::Real(*value),
-        Value::Text(text) if text.is_empty() || text.chars().any(char::is_control) => return None,
-        Value::Text(text) => eds::Value::Text(text.clone()),
-        Value::Bytes(_) => eds::Value::Text(value.to_string()),
-    };
-    Some(Formula::Constant(value))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use canopen::{Duration, NodeId};
-use eds::Eds;
+use eds::{DeviceInfo, Eds};
 use thiserror::Error;
 
 use super::{File, Member, Start};
@@ -76,8 +76,12 @@ impl Plan {
             if nodes.iter().any(|other| other.node == node) {
                 return Err(PlanError::Twice(member.node).into());
             }
+            check_consumes(node, &member)?;
             let eds = member.sheet.as_deref().map(&mut sheet).transpose()?;
             let dcf = member.configuration.as_deref().map(&mut configuration).transpose()?;
+            if let (Some(sheet), Some(dcf)) = (&eds, &dcf) {
+                check_device(node, &sheet.device, &dcf.device)?;
+            }
             let catalogue = eds.or_else(|| dcf.clone()).map(|sheet| Arc::new(Catalogue::new(sheet)));
             let planned = PlannedNode { node, member, catalogue, dcf };
             if let Some(catalogue) = &planned.catalogue {
@@ -101,6 +105,31 @@ impl Plan {
         let several = senders.into_iter().filter(|(_, nodes)| nodes.len() > 1);
         several.map(|(id, nodes)| (id, nodes.into_iter().collect())).collect()
     }
+}
+
+/// Refuses nodes whose heartbeat 1016h cannot monitor.
+fn check_consumes(node: NodeId, member: &Member) -> Result<(), PlanError> {
+    let why = |other: &u8| match NodeId::new(*other) {
+        None => Some(format!("consumes: {}", PlanError::NodeId(*other))),
+        Some(own) if own == node => Some(format!("consumes: {other} is the node itself")),
+        Some(_) => None,
+    };
+    let reason = member.consumes.keys().find_map(why);
+    reason.map_or(Ok(()), |reason| Err(PlanError::Value { node: node.get(), reason }))
+}
+
+/// Refuses a configuration file for another device than that of the data sheet, as far as both name one.
+fn check_device(node: NodeId, sheet: &DeviceInfo, dcf: &DeviceInfo) -> Result<(), PlanError> {
+    let pairs = [(sheet.vendor_number, dcf.vendor_number), (sheet.product_number, dcf.product_number)];
+    if pairs.into_iter().all(|(sheet, dcf)| sheet == dcf || sheet == 0 || dcf == 0) {
+        return Ok(());
+    }
+    let device = |info: &DeviceInfo| {
+        format!("vendor {:08X}h, product {:08X}h", info.vendor_number, info.product_number)
+    };
+    let reason =
+        format!("the configuration file is for {}, and the data sheet for {}", device(dcf), device(sheet));
+    Err(PlanError::Value { node: node.get(), reason })
 }
 
 impl PlannedNode {

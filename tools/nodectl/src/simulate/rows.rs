@@ -32,7 +32,7 @@ const MAX_DEFAULTS: usize = 1 << 16;
 pub struct Table {
     /// The dictionary for the library's device.
     pub dictionary: &'static Dictionary,
-    /// Values that no row can have as a default: texts of 16-bit characters, and bytes.
+    /// Values that no row can have as a default: texts of 16-bit characters, bytes, and large numbers of UNSIGNED64.
     pub values: Vec<((u16, u8), Vec<u8>)>,
     /// Omissions and changes, in words.
     pub notes: Vec<String>,
@@ -131,7 +131,7 @@ impl Rows {
             (0x1014, 0) if formula.is_none() => row.default = DefaultValue::NodeId(0x80),
             _ => (),
         }
-        if let (Type::OctetString(_), Some(value)) = (kind, value) {
+        if let Some(value) = value.filter(|value| has_no_default(kind, value)) {
             self.values.push((key, value));
         }
         self.rows.insert(key, row);
@@ -216,6 +216,12 @@ fn kind(data_type: DataType, value: Option<&[u8]>) -> Option<Type> {
         0x1B => Type::Unsigned64,
         _ => return None,
     })
+}
+
+/// Whether a row cannot have a value as its default: bytes, and the upper half of UNSIGNED64.
+fn has_no_default(kind: Type, value: &[u8]) -> bool {
+    let is_large = kind == Type::Unsigned64 && value.last().is_some_and(|highest| *highest & 0x80 != 0);
+    is_large || matches!(kind, Type::OctetString(_))
 }
 
 /// The bytes of a value.

@@ -137,6 +137,34 @@ fn every_bad_input_has_an_error_text() {
 }
 
 #[test]
+fn an_error_of_the_command_line_names_the_arguments_in_json() {
+    for (line, words) in [
+        (&["--json", "map", "tpdo", "2"][..], "arguments were not provided: <OBJECT>..."),
+        (&["--json", "write", "1017"], "arguments were not provided: <VALUE>"),
+        (&["--json", "completions", "cmd"], "[possible values: bash, elvish, fish, powershell, zsh]"),
+    ] {
+        let output =
+            Command::cargo_bin("nodectl").expect("the program").args(line).output().expect("an output");
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let error = value["error"].as_str().unwrap_or_default();
+        assert!(error.contains(words) && !error.contains('\n') && !error.contains("Usage"), "{error}");
+    }
+}
+
+/// CANopen and slcan have no other bit rates, and a file with another one fits no device.
+#[test]
+fn a_bit_rate_that_no_bus_has_is_refused() {
+    for rate in ["0", "333", "1001", "65536"] {
+        let output = Command::cargo_bin("nodectl")
+            .expect("the program")
+            .args(["dump", "--bit-rate", rate])
+            .output()
+            .expect("an output");
+        assert_eq!(output.status.code(), Some(2), "{rate}");
+    }
+}
+
+#[test]
 fn a_script_gets_every_error_as_json() {
     for line in [
         &["fly", "--json"][..],

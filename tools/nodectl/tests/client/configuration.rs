@@ -99,6 +99,26 @@ fn a_file_for_another_product_changes_nothing() {
     assert_eq!((code, text.contains("product 00000002h")), (7, true), "{text}");
 }
 
+/// A product code is unique only together with the vendor-ID (CiA 301, 7.5.2.14).
+#[test]
+fn a_file_for_a_product_of_another_vendor_changes_nothing() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = path("vendor.dcf");
+    printed(&wire, &["write", "1017", "777"]);
+    printed(&wire, &["dump", &file]);
+    printed(&wire, &["write", "1017", "1000"]);
+    let own = text(&file);
+    let (before, after) = own.split_once("VendorNumber=").expect("a vendor");
+    let after = after.split_once('\r').expect("a line").1;
+    std::fs::write(&file, format!("{before}VendorNumber=0x3E7\r{after}")).expect("a file");
+    for line in [&["apply", &file][..], &["apply", &file, "--dry-run"]] {
+        let (code, text) = failed(&wire, line);
+        assert_eq!((code, text.contains("vendor 000003E7h")), (7, true), "{text}");
+    }
+    assert!(printed(&wire, &["read", "1017"]).contains("= 1000 ms"), "nothing was written");
+    assert_eq!(printed(&wire, &["apply", &file, "--force"]), "node 1: 1 change, read back\n");
+}
+
 /// A file that is cut, or that has a value which its object cannot have, is refused as a whole.
 #[test]
 fn a_damaged_file_is_not_applied() {

@@ -15,11 +15,15 @@ mod loader;
 mod lss;
 mod meanings;
 mod net;
+mod order;
 mod pressure;
 mod process;
 mod rules;
 mod safety;
 mod simulate;
+#[cfg(unix)]
+mod targets;
+mod texts;
 mod trace;
 mod transfers;
 mod update;

@@ -197,6 +197,25 @@ fn a_mistake_at_the_last_node_changes_no_node() {
     });
 }
 
+/// The command line is right: the file has the mistake, also where the identity of the node decides on its data sheet.
+#[test]
+fn a_mistake_of_the_file_is_7_in_every_command() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("mistake.yaml");
+    for (lines, words) in [
+        ("heartbeat: 500\n    values: { 1017: 600 }", "the file sets it twice"),
+        ("values: { 5FFF: 1 }", "5FFFh:0 is no object"),
+        ("values: { 1017: 1000.5 }", "is not a whole number"),
+    ] {
+        fs::write(&file, format!("nodes:\n  - node: 1\n    {lines}\n")).unwrap();
+        for command in ["check", "apply"] {
+            let (code, text) = failed(&wire, &["net", command, file.to_str().unwrap()]);
+            let is_named = text.contains("mistake.yaml: node 1: ") && text.contains(words);
+            assert_eq!((code, is_named), (7, true), "{command}: {text}");
+        }
+    }
+}
+
 #[test]
 fn an_object_is_set_once() {
     let wire = Wire::new(devices(1));
@@ -218,6 +237,33 @@ fn a_truncated_configuration_file_changes_no_node() {
     fs::write(&file, "nodes:\n  - node: 1\n  - node: 2\n    configuration: cut.dcf\n").unwrap();
     let (code, text) = failed(&wire, &["net", "apply", file.to_str().unwrap()]);
     assert_eq!((code, text.contains("1018h is listed and has no section")), (7, true), "{text}");
+}
+
+/// The identity of the node is that of the data sheet, and the values would be those of another device.
+#[test]
+fn a_configuration_file_for_another_device_than_the_data_sheet_is_refused() {
+    let wire = Wire::new(devices(1));
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let text = fs::read_to_string(corpus("plain-io.eds")).unwrap();
+    let sheet = corpus("plain-io.eds");
+    for (number, is_same) in [("0x101", true), ("0x102", false)] {
+        fs::write(
+            folder.join("other.dcf"),
+            text.replace("ProductNumber=0x101", &format!("ProductNumber={number}")),
+        )
+        .unwrap();
+        let file = folder.join("other.yaml");
+        let lines = format!(
+            "start: none\nnodes:\n  - node: 1\n    sheet: {}\n    configuration: other.dcf\n",
+            sheet.display()
+        );
+        fs::write(&file, lines).unwrap();
+        let (_, result) = run(&wire, &["net", "apply", file.to_str().unwrap()]);
+        let text = result.map_or_else(|failure| failure.to_string(), |()| String::new());
+        let words = "node 1: the configuration file is for vendor 000003E7h, product 00000102h";
+        assert_eq!(text.contains(words), !is_same, "{text}");
+        assert_eq!(text.is_empty(), is_same, "{text}");
+    }
 }
 
 #[test]
@@ -331,4 +377,34 @@ fn a_monitored_node_is_shown_with_its_time() {
     let (lines, _) = run(&wire, &["net", "check", file.to_str().unwrap()]);
     assert!(lines.starts_with("node 1: value: 1016h:1 "), "{lines}");
     assert!(lines.ends_with(" is off instead of node 5, 1000 ms\n"), "{lines}");
+}
+
+/// 1016h monitors nothing with such a node-ID (CiA 301, 7.5.2.19), and a node does not receive its own heartbeat.
+#[test]
+fn a_node_that_cannot_be_monitored_is_refused() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("consumes.yaml");
+    for (consumes, words) in [
+        ("0: 1000", "node 1: consumes: 0 is no node-ID, 1 to 127"),
+        ("5: 500, 128: 1000", "node 1: consumes: 128 is no node-ID, 1 to 127"),
+        ("255: 1000", "node 1: consumes: 255 is no node-ID, 1 to 127"),
+        ("1: 1000", "node 1: consumes: 1 is the node itself"),
+    ] {
+        fs::write(&file, format!("nodes:\n  - node: 1\n    consumes: {{ {consumes} }}\n")).unwrap();
+        for command in ["apply", "check"] {
+            let (code, text) = failed(&wire, &["net", command, file.to_str().unwrap()]);
+            assert_eq!((code, text.contains(words)), (7, true), "{text}");
+        }
+    }
+    assert!(printed(&wire, &["read", "1016:1"]).contains(" = 0 "));
+}
+
+/// Two values with one meaning are told as numbers.
+#[test]
+fn an_entry_of_1016h_that_is_off_differs_from_another_one_by_its_number() {
+    let wire = Wire::new(Pressure::new(1));
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("off.yaml");
+    fs::write(&file, "nodes:\n  - node: 1\n    consumes: { 5: 0 }\n").unwrap();
+    let (lines, _) = run(&wire, &["net", "check", file.to_str().unwrap()]);
+    assert!(lines.contains(" is 0 instead of 327680\n"), "{lines}");
 }

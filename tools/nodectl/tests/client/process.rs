@@ -108,6 +108,18 @@ fn a_socketcand_daemon_is_a_bus() {
     assert_eq!((code, error.contains("no such bus")), (4, true), "{error}");
 }
 
+/// The node keeps its node-ID until then, also if it is to have none.
+#[test]
+fn a_node_id_that_waits_for_a_reset_is_announced() {
+    let bus = daemon();
+    for id in ["9", "255"] {
+        let line = ["lss", "set-id", id, "--select", "0:1:0x10000:0x12345678"];
+        let (code, out, error) = nodectl(&bus, &line);
+        assert_eq!((code, out), (0, format!("node-ID {id}\n")), "{error}");
+        assert!(error.contains("in force after `nodectl nmt reset-comm --node all`"), "{id}: {error}");
+    }
+}
+
 /// For a wrong scheme with the right port, the error names the right scheme.
 #[test]
 fn slcan_at_a_socketcand_daemon_is_reported() {

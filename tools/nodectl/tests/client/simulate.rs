@@ -184,3 +184,24 @@ fn a_dbc_file_has_the_nodes_that_answer() {
     assert_eq!(failed(&wire, &["map", "--dbc", path, "-n", "8,9", &eds[0], &eds[1]]).0, 3);
     assert_eq!(std::fs::read(&file).unwrap(), before);
 }
+
+#[test]
+fn a_default_of_64_bits_is_that_of_the_data_sheet() {
+    for (data_type, default, expected) in [
+        (0x1B, "0xFFFFFFFFFFFFFFFF", u64::MAX),
+        (0x1B, "0x8000000000000000", 1 << 63),
+        (0x1B, "0x7FFFFFFFFFFFFFFF", u64::MAX >> 1),
+        (0x15, "-9223372036854775808", 1 << 63),
+        (0x15, "-1", u64::MAX),
+    ] {
+        let text = std::fs::read_to_string(corpus("plain-io.eds")).expect("a data sheet");
+        let text = format!(
+            "{text}\n[2F00]\nParameterName=Long\nDataType={data_type}\nAccessType=rw\nDefaultValue={default}\n"
+        );
+        let node = NodeId::new(5);
+        let table = Table::new(&Eds::parse(&text).expect("a data sheet"), node).expect("a table");
+        let wire = Wire::new(Node::new(table, node));
+        let bytes = client(&mut wire.network(), 5).upload(at(0x2F00, 0)).expect("a value");
+        assert_eq!(bytes, expected.to_le_bytes(), "{data_type:X}h {default}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Checks of the EMCY messages.
 
 use super::super::prelude::*;
-use super::provoke::{LIFE, codes, heartbeat_is_back, lose_heartbeat, messages, unused_node_id};
+use super::provoke::{LIFE, codes, heartbeat_is_back, lose_heartbeat, messages, unused_node_id, watch};
 
 pub(super) const CHECKS: &[Check] = &[
     Check::new("EMC-20", "An error sends an EMCY with its code", "CiA 301, table 26", code),
@@ -79,7 +79,8 @@ fn stopped(s: &mut Subject<'_>) -> Outcome {
     if s.try_read(0x1016, 1)?.is_err() {
         return Err(skip("no error can be caused from the bus: the device has no 1016h"));
     }
-    s.set(0x1016, 1, u32::from(node) << 16 | 100)?;
+    s.plain_emcy()?;
+    watch(s, node)?;
     s.send(0x700 + node, &[0x05])?;
     s.enter(State::Stopped)?;
     let mark = s.mark();

@@ -1,7 +1,7 @@
 //! Checks of 1001h, 1014h and 1015h.
 
 use super::super::prelude::*;
-use super::provoke::{LIFE, codes, lose_heartbeat, unused_node_id};
+use super::provoke::{LIFE, codes, lose_heartbeat, lose_heartbeat_only, unused_node_id};
 
 pub(super) const CHECKS: &[Check] = &[
     Check::new("EMC-01", "1014h is 80h and the node-ID", "CiA 301, 7.5.2.17", cob_id),
@@ -18,7 +18,7 @@ pub(super) const CHECKS: &[Check] = &[
 fn cob_id(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1014, 0)?;
     let expected = 0x80 + u32::from(s.id());
-    s.holds(0x1014, 0, expected)
+    s.with_default_of((0x1014, 0), expected, |s| s.holds(0x1014, 0, expected))
 }
 
 fn register_size(s: &mut Subject<'_>) -> Outcome {
@@ -39,6 +39,7 @@ fn register_clear(s: &mut Subject<'_>) -> Outcome {
 
 fn locked(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1014, 0)?;
+    s.plain_emcy()?;
     let other = 0x80 + u32::from(unused_node_id(s));
     s.refuses(
         0x1014,
@@ -63,7 +64,7 @@ fn off(s: &mut Subject<'_>) -> Outcome {
     let before = s.number(0x1014, 0)?;
     s.set_if_supported(0x1014, 0, before | OFF)?;
     let node = unused_node_id(s);
-    let mark = lose_heartbeat(s, node)?;
+    let mark = lose_heartbeat_only(s, node)?;
     let codes = codes(s, mark);
     ensure(codes.is_empty(), "no EMCY", format!("{codes:04X?}"))
 }
@@ -75,7 +76,7 @@ fn moved(s: &mut Subject<'_>) -> Outcome {
     s.set_if_supported(0x1014, 0, 0x6D0 | OFF)?;
     s.set_if_supported(0x1014, 0, 0x6D0)?;
     let node = unused_node_id(s);
-    let mark = lose_heartbeat(s, node)?;
+    let mark = lose_heartbeat_only(s, node)?;
     let moved = s.heard(mark, 0x6D0);
     let is_told = moved.iter().any(|heard| heard.frame.data().starts_with(&LIFE.to_le_bytes()));
     ensure(is_told, "EMCY 8130h with CAN-ID 6D0h", format!("{} frames with it", moved.len()))

@@ -40,6 +40,7 @@ fn other(s: &Subject<'_>) -> u16 {
 fn watch(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
     s.need(0x1016, 1)?;
+    s.plain_emcy()?;
     for sub in 1..=u8::try_from(s.number(0x1016, 0)?).unwrap_or(1) {
         s.set(0x1016, sub, 0)?;
     }

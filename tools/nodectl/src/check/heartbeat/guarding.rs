@@ -138,6 +138,7 @@ fn take_values(s: &mut Subject<'_>) -> Outcome {
 fn life_guarding(s: &mut Subject<'_>) -> Outcome {
     need_guarding(s)?;
     s.need(0x1014, 0)?;
+    s.plain_emcy()?;
     s.set(0x100C, 0, 100)?;
     s.set(0x100D, 0, 2)?;
     guard(s)?;

@@ -107,6 +107,7 @@ fn short(s: &mut Subject<'_>) -> Outcome {
 fn short_emcy(s: &mut Subject<'_>) -> Outcome {
     let entry = output(s)?;
     let pdo = listening(s, &entry, 255)?;
+    s.plain_emcy()?;
     let (mark, id) = (s.mark(), 0x80 + s.id());
     s.send(pdo.id(), &[])?;
     let told = s.next(mark, id, 300)?.map(|told| told.frame.data().to_vec()).unwrap_or_default();
@@ -126,6 +127,7 @@ fn long(s: &mut Subject<'_>) -> Outcome {
 fn synchronous(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
     let entry = output(s)?;
+    s.plain_sync()?;
     let pdo = listening(s, &entry, 1)?;
     let value = other_value(s, &entry)?;
     let early = arrives(s, &entry, pdo.id(), &value, &value)?;
@@ -165,6 +167,7 @@ fn deadline(s: &mut Subject<'_>) -> Outcome {
     s.set(pdo.index, 5, 100)?;
     s.switch_on(pdo)?;
     let value = s.read(entry.index, entry.sub)?;
+    s.plain_emcy()?;
     let (mark, id) = (s.mark(), 0x80 + s.id());
     s.send(pdo.id(), &value)?;
     let told = s.next(mark, id, 500)?.map(|told| told.frame.data().to_vec()).unwrap_or_default();

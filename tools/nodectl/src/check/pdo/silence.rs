@@ -95,6 +95,7 @@ fn start_value<const IS_STOPPED: bool>(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
     let pdo = s.tpdo(1, 0)?;
     s.need(pdo.index, 6)?;
+    s.unlock_counter()?;
     s.set_if_supported(0x1019, 0, 10)?;
     s.set_if_supported(pdo.index, 6, 2)?;
     listen(s, pdo, IS_STOPPED, |s| {

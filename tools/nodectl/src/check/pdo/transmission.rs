@@ -107,9 +107,7 @@ fn start_value(s: &mut Subject<'_>) -> Outcome {
     let pdo = s.tpdo(1, 0)?;
     s.need(pdo.index, 6)?;
     s.need(0x1019, 0)?;
-    if s.try_read(0x1006, 0)?.is_ok() {
-        s.set(0x1006, 0, 0)?;
-    }
+    s.unlock_counter()?;
     s.set_if_supported(0x1019, 0, 10)?;
     s.set_if_supported(pdo.index, 6, 4)?;
     s.switch_on(pdo)?;

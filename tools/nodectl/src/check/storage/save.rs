@@ -45,15 +45,28 @@ fn keeps(
 ) -> Outcome<bool> {
     s.need(0x1010, group)?;
     s.reset(Command::ResetNode)?;
-    let before = s.read(index, sub)?;
+    let kept = s.written.len();
+    if (index, sub) == (0x1019, 0) {
+        s.unlock_counter()?;
+    }
+    let is_kept = saved_and_restarted(s, (index, sub), bytes, group, restart);
+    s.put_back_since(kept)?;
+    s.try_write(0x1010, group, b"save")?
+        .map_err(|refusal| fail("the former value is saved again", refusal))?;
+    is_kept
+}
+
+fn saved_and_restarted(
+    s: &mut Subject<'_>,
+    (index, sub): (u16, u8),
+    bytes: &[u8],
+    group: u8,
+    restart: Command,
+) -> Outcome<bool> {
     s.write(index, sub, bytes)?;
     s.try_write(0x1010, group, b"save")?.map_err(|refusal| fail(format!("1010h:{group} saves"), refusal))?;
     s.reset(restart)?;
-    let after = s.read(index, sub)?;
-    s.write(index, sub, &before)?;
-    s.try_write(0x1010, group, b"save")?
-        .map_err(|refusal| fail("the former value is saved again", refusal))?;
-    Ok(after == bytes)
+    Ok(s.read(index, sub)? == bytes)
 }
 
 fn is_kept(s: &mut Subject<'_>, at: (u16, u8), bytes: &[u8]) -> Outcome {

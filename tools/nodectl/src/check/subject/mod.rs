@@ -3,6 +3,7 @@
 mod bus;
 mod control;
 mod pdo;
+mod restore;
 mod sdo;
 mod segments;
 mod sheet;
@@ -17,6 +18,7 @@ use crate::Network;
 pub(in crate::check) use bus::Mark;
 pub(in crate::check) use pdo::mapped;
 pub(in crate::check) use pdo::{OFF, Pdo, RPDO, TPDO};
+pub(in crate::check) use restore::Values;
 pub(in crate::check) use sdo::{Refusal, abort};
 pub(in crate::check) use sheet::size;
 pub use verdict::{Deviation, Outcome, Stop, Verdict};
@@ -41,6 +43,8 @@ pub struct Subject<'n> {
     setup: Setup,
     /// The objects that were written, with their former bytes; the newest is the last.
     pub(super) written: Vec<(Multiplexer, Vec<u8>)>,
+    /// Whether a check may make the device store values.
+    pub(super) may_store: bool,
     /// Whether other nodes were heard on the bus. Then no frames for all nodes are sent.
     has_company: bool,
 }
@@ -48,7 +52,7 @@ pub struct Subject<'n> {
 impl<'n> Subject<'n> {
     /// The device with this node-ID.
     pub fn new(network: &'n mut Network, setup: Setup) -> Subject<'n> {
-        Subject { network, setup, written: Vec::new(), has_company: false }
+        Subject { network, setup, written: Vec::new(), may_store: false, has_company: false }
     }
 
     /// The node-ID.

@@ -106,6 +106,9 @@ impl Subject<'_> {
 
     /// A TPDO with one mapped object, this transmission type and this event timer, still switched off.
     pub(in crate::check) fn tpdo(&mut self, transmission: u32, event_timer: u32) -> Outcome<Pdo> {
+        if transmission <= 240 {
+            self.plain_sync()?;
+        }
         let pdo = self.pdo(TPDO)?;
         self.set_if_supported(pdo.index, 2, transmission)?;
         if let Some(1..) = self.optional(pdo.index, 3)? {

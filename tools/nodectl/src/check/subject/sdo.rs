@@ -290,56 +290,6 @@ impl Subject<'_> {
         let is_served = self.is_served()?;
         ensure(is_served, format!("1000h can be read after {after}"), "no answer")
     }
-
-    /// Switches the changed PDOs off, because a PDO in use refuses changes of its parameters.
-    fn switch_off(&mut self, written: &[(Multiplexer, Vec<u8>)]) -> Outcome {
-        let mut pdos: Vec<u16> = written.iter().map(|(at, _)| at.index & !0x0200).collect();
-        pdos.retain(|index| is_communication(*index));
-        pdos.sort_unstable();
-        pdos.dedup();
-        for index in pdos {
-            if let Ok(bytes) = self.try_read(index, 1)? {
-                let off: Vec<u8> = bytes
-                    .iter()
-                    .enumerate()
-                    .map(|(i, byte)| if i == 3 { byte | 0x80 } else { *byte })
-                    .collect();
-                // A refusal here shows up again when the values are written back.
-                let _ = self.try_write(index, 1, &off)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes back the objects whose value has changed, the newest first.
-    pub(in crate::check) fn put_back(&mut self) -> Outcome {
-        let written = std::mem::take(&mut self.written);
-        let mut refused = Vec::new();
-        self.switch_off(&written)?;
-        // A PDO is switched on last, after its other parameters are restored.
-        let is_switch = |at: &Multiplexer| at.sub == 1 && is_communication(at.index);
-        let (switches, others): (Vec<_>, Vec<_>) = written.into_iter().partition(|(at, _)| is_switch(at));
-        let mut first: Vec<(Multiplexer, Vec<u8>)> = Vec::new();
-        for (at, before) in switches {
-            if first.iter().all(|(other, _)| *other != at) {
-                first.push((at, before));
-            }
-        }
-        for (Multiplexer { index, sub }, before) in others.into_iter().rev().chain(first) {
-            let now = self.try_read(index, sub)?;
-            if now.is_ok_and(|now| now != before)
-                && let Err(refusal) = self.try_write(index, sub, &before)?
-            {
-                refused.push(format!("{}: {refusal}", Place(at(index, sub))));
-            }
-        }
-        ensure(refused.is_empty(), "what was changed is taken back", refused.join(", "))
-    }
-}
-
-/// Whether an index belongs to the communication parameters of a PDO.
-const fn is_communication(index: u16) -> bool {
-    matches!(index, 0x1400..=0x15FF | 0x1800..=0x19FF)
 }
 
 /// Returns a refusal as a result. Any other error of the transfer is a deviation from the protocol.

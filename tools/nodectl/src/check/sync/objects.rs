@@ -18,8 +18,15 @@ pub(super) const CHECKS: &[Check] = &[
 
 fn default_id(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1005, 0)?;
+    let is_default = |value: u32| value & 0x1FFF_FFFF == 0x80;
     let value = s.number(0x1005, 0)?;
-    ensure(value & 0x1FFF_FFFF == 0x80, "CAN-ID 80h", format!("{value:08X}h"))
+    if is_default(value) {
+        return Ok(());
+    }
+    s.with_default_of((0x1005, 0), 0x80, |s| {
+        let value = s.number(0x1005, 0)?;
+        ensure(is_default(value), "CAN-ID 80h", format!("{value:08X}h"))
+    })
 }
 
 fn restricted(s: &mut Subject<'_>) -> Outcome {
@@ -49,11 +56,13 @@ fn moved(s: &mut Subject<'_>) -> Outcome {
 
 fn overflow<const VALUE: u32>(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1019, 0)?;
+    s.unlock_counter()?;
     s.refuses(0x1019, 0, VALUE, &[abort::VALUE, abort::TOO_HIGH, abort::TOO_LOW])
 }
 
 fn takes(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1019, 0)?;
+    s.unlock_counter()?;
     for value in [2, 240] {
         s.set(0x1019, 0, value)?;
         s.holds(0x1019, 0, value)?;
@@ -64,6 +73,7 @@ fn takes(s: &mut Subject<'_>) -> Outcome {
 fn locked(s: &mut Subject<'_>) -> Outcome {
     s.need(0x1019, 0)?;
     s.need(0x1006, 0)?;
+    s.unlock_counter()?;
     s.set(0x1019, 0, 0)?;
     s.set(0x1006, 0, 1_000_000)?;
     s.refuses(0x1019, 0, 10, &[abort::STATE, abort::PARAMETER])

@@ -97,11 +97,12 @@ impl Lss {
         let released = master.release();
         let done = done?;
         released?;
-        if let Some((id, true)) = done.new_id() {
-            booted(session, id)?;
-        }
-        if let Some((_, false)) = done.new_id() {
-            note("in force after `nodectl nmt reset-comm --node all`");
+        if let Answer::NodeId { id, boots, .. } = done {
+            match id {
+                _ if !boots => note("in force after `nodectl nmt reset-comm --node all`"),
+                Some(id) => booted(session, id)?,
+                None => (),
+            }
         }
         done.print(session)
     }
@@ -168,7 +169,7 @@ impl Lss {
 enum Answer {
     Slave(Slave),
     Done(Done),
-    /// A new node-ID, and whether the node boots with it at once.
+    /// A new node-ID or none, and whether the node had none, so that it boots with a new one at once.
     NodeId {
         done: Done,
         id: Option<NodeId>,
@@ -177,13 +178,6 @@ enum Answer {
 }
 
 impl Answer {
-    fn new_id(&self) -> Option<(NodeId, bool)> {
-        match self {
-            Answer::NodeId { id, boots, .. } => id.map(|id| (id, *boots)),
-            _ => None,
-        }
-    }
-
     fn print(&self, session: &mut Session) -> Result<(), Failure> {
         match self {
             Answer::Slave(slave) => session.print(slave),

@@ -37,7 +37,7 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
         print(session, findings)
     };
     tell(session, &of_bus(plan, &found))?;
-    let mut verified = verify(session, plan, &found, how)?;
+    let mut verified = verify(session, plan, &found)?;
     let (mut configured, mut may_start) = (Vec::new(), true);
     for planned in &plan.nodes {
         if !is_there(&found, planned.node) {
@@ -69,12 +69,12 @@ pub(super) fn run(session: &mut Session, plan: &Plan, how: &Applied) -> Result<(
 type Verified = BTreeMap<NodeId, Vec<Finding>>;
 
 /// Looks for mistakes of the file at nodes whose data sheet depends on their identity, before any node is changed.
-fn verify(session: &mut Session, plan: &Plan, found: &Found, how: &Applied) -> Result<Verified, Failure> {
+fn verify(session: &mut Session, plan: &Plan, found: &Found) -> Result<Verified, Failure> {
     let mut verified = Verified::new();
     let is_open = |planned: &&PlannedNode| planned.catalogue.is_none() && is_there(found, planned.node);
     for planned in plan.nodes.iter().filter(is_open) {
         session.begin_all();
-        match verify_one(session, planned, how) {
+        match verify_one(session, planned) {
             // The configuration of the node reports it.
             Err(failure @ Failure::Sdo(_)) => drop(Finding::of_failure(planned.node, failure)?),
             result => drop(verified.insert(planned.node, result?)),
@@ -83,11 +83,11 @@ fn verify(session: &mut Session, plan: &Plan, found: &Found, how: &Applied) -> R
     Ok(verified)
 }
 
-fn verify_one(session: &mut Session, planned: &PlannedNode, how: &Applied) -> Result<Vec<Finding>, Failure> {
+fn verify_one(session: &mut Session, planned: &PlannedNode) -> Result<Vec<Finding>, Failure> {
     let findings = of_identity(session, planned)?;
     if findings.is_empty() {
         let catalogue = catalogue(session, planned)?;
-        planned.wanted(&catalogue).map_err(|error| Failure::file(&how.file, error))?;
+        planned.wanted(&catalogue)?;
     }
     Ok(findings)
 }

@@ -1,6 +1,6 @@
 //! `nodectl net check`: the bus and its file, compared.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Display;
 
 use canopen::nmt::State;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::finding::{Finding, What, end, print};
 use super::senders::{Senders, listed};
 use super::{Failure, LISTEN, Session, catalogue, patience};
-use crate::configuration::Configuration;
+use crate::configuration::{Configuration, Difference, looked_at};
 use crate::net::{Date, Plan, PlannedNode, Start};
 use crate::object::{Place, at};
 use crate::scan::{Presence, scan};
@@ -108,15 +108,24 @@ fn compare(session: &mut Session, planned: &PlannedNode, findings: &mut Vec<Find
     let present = values(session, planned.node, &catalogue, &wanted)?;
     let is_wanted = |at: Multiplexer| wanted.values.contains_key(&(at.index, at.sub));
     for difference in wanted.differences(&present).into_iter().filter(|one| is_wanted(one.at)) {
-        let text = |value: &Option<Value>| {
-            value.as_ref().map_or("not there".to_owned(), |value| words(&catalogue, difference.at, value))
-        };
         let name = catalogue.name(difference.at).unwrap_or_default();
-        let (wanted, present) = (text(&difference.first), text(&difference.second));
+        let [wanted, present] = texts(&catalogue, &difference);
         let words = format!("{} {name} is {present} instead of {wanted}", Place(difference.at));
         findings.push(Finding::new(planned.node, What::Value, words));
     }
     Ok(())
+}
+
+/// The values of a difference in words; as they are where they have one meaning.
+fn texts(catalogue: &Catalogue, Difference { at, first, second }: &Difference) -> [String; 2] {
+    let text = |value: &Option<Value>, words: &dyn Fn(&Value) -> String| {
+        value.as_ref().map_or("not there".to_owned(), words)
+    };
+    let meanings = [first, second].map(|value| text(value, &|value| words(catalogue, *at, value)));
+    if meanings[0] == meanings[1] {
+        return [first, second].map(|value| text(value, &|value| visible(&value.to_string())));
+    }
+    meanings
 }
 
 /// A value in words: its meaning for an entry of 1016h, else the value itself.
@@ -125,8 +134,8 @@ fn words(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> String {
     meaning.unwrap_or_else(|| visible(&value.to_string()))
 }
 
-/// The values that a node has of the wanted parameters, and the COB-IDs and sizes of the PDOs to which they belong. A value
-/// that the node refuses is missing.
+/// The values that a node has of the wanted parameters, and of the objects on which the steps to them depend, such as the
+/// COB-ID of a PDO. A value that the node refuses is missing.
 pub(super) fn values(
     session: &mut Session,
     node: NodeId,
@@ -134,13 +143,10 @@ pub(super) fn values(
     wanted: &Configuration,
 ) -> Result<Configuration, Failure> {
     let mut present = Configuration::default();
-    let pdos = wanted.values.keys().filter(|key| (0x1400..=0x1BFF).contains(&key.0));
-    let of_pdos = pdos.flat_map(|key| [(key.0 & !0x0200, 1), (key.0 | 0x0200, 0)]);
-    let keys: BTreeSet<(u16, u8)> = wanted.values.keys().copied().chain(of_pdos).collect();
-    for (index, sub) in &keys {
-        let Some(entry) = catalogue.sheet().get(*index, *sub) else { continue };
-        if let Some(bytes) = session.optional(node, at(*index, *sub))? {
-            present.values.insert((*index, *sub), Value::decode(&bytes, entry.data_type));
+    for (index, sub) in looked_at(wanted) {
+        let Some(entry) = catalogue.sheet().get(index, sub) else { continue };
+        if let Some(bytes) = session.optional(node, at(index, sub))? {
+            present.values.insert((index, sub), Value::decode(&bytes, entry.data_type));
         }
     }
     Ok(present)

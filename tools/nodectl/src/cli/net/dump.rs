@@ -4,10 +4,11 @@ use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use canopen::NodeId;
-use eds::{Commissioning, Reals};
+use eds::Reals;
 use serde::Serialize;
 
-use super::super::replacement::Replacement;
+use super::super::dump::{commissioning, note_left_out};
+use super::super::replacement::{Replacement, check_is_file};
 use super::check::{date, is_there};
 use super::{Failure, LISTEN, Session};
 use crate::object::at;
@@ -22,6 +23,7 @@ struct Done {
 }
 
 pub(super) fn run(session: &mut Session, file: &Path) -> Result<(), Failure> {
+    check_is_file(file)?;
     session.has_many_nodes = true;
     let found = scan(&mut session.network, LISTEN)?;
     let nodes: Vec<NodeId> = found.keys().copied().filter(|node| is_there(&found, *node)).collect();
@@ -70,13 +72,12 @@ fn add(session: &mut Session, node: NodeId, file: &Path, text: &mut String) -> R
     }
     let sheet = catalogue.sheet();
     let values = session.configuration(node, sheet)?;
-    let mut dcf = values.to_sheet(sheet, node, false);
-    let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
-    dcf.commissioning =
-        Some(Commissioning { node_id: id, bit_rate: session.options.known_bit_rate(), serial });
+    let commissioning = commissioning(session, node)?;
     let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("net");
     let name = format!("{stem}-node{id}.dcf");
-    Replacement::write(&file.with_file_name(&name), dcf.to_dcf(&name, Reals::Decimal).as_bytes())?;
+    let dcf = values.to_dcf(sheet, &name, commissioning, false, Reals::Decimal);
+    note_left_out(sheet, &dcf);
+    Replacement::write(&file.with_file_name(&name), dcf.text.as_bytes())?;
     line("configuration", serde_json::Value::from(name).to_string());
     Ok(true)
 }

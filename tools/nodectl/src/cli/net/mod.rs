@@ -16,7 +16,7 @@ use clap::{Args, Subcommand};
 use super::session::{sheet, whole};
 use super::{Failure, Session};
 use crate::Catalogue;
-use crate::net::{File, Plan, PlanError, PlannedNode, schema};
+use crate::net::{File, Plan, PlannedNode, schema};
 
 /// The largest file of a bus.
 const LARGEST: u64 = 1 << 20;
@@ -80,17 +80,15 @@ impl Net {
 
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         match &self.command {
-            Command::Check(Checked { file }) => check::run(session, &load(file)?),
-            Command::Apply(how) => apply::run(session, &load(&how.file)?, how),
+            Command::Check(Checked { file }) => {
+                check::run(session, &load(file)?).map_err(|failure| in_file(file, failure))
+            }
+            Command::Apply(how) => {
+                apply::run(session, &load(&how.file)?, how).map_err(|failure| in_file(&how.file, failure))
+            }
             Command::Dump(Dumped { file }) => dump::run(session, file),
             Command::Schema => Ok(session.output.write(format!("{:#}\n", schema()).as_bytes())?),
         }
-    }
-}
-
-impl From<PlanError> for Failure {
-    fn from(error: PlanError) -> Failure {
-        Failure::Usage(error.to_string())
     }
 }
 
@@ -100,10 +98,15 @@ fn load(path: &Path) -> Result<Plan, Failure> {
     let file = File::parse(&text).map_err(|reason| Failure::file(path, reason))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let plan = Plan::new(file, |named| sheet(&folder.join(named)), |named| whole(&folder.join(named)));
-    plan.map_err(|failure| match failure {
-        Failure::Usage(reason) => Failure::file(path, reason),
+    plan.map_err(|failure| in_file(path, failure))
+}
+
+/// A mistake with the name of the file.
+fn in_file(path: &Path, failure: Failure) -> Failure {
+    match failure {
+        Failure::Plan(error) => Failure::file(path, error),
         other => other,
-    })
+    }
 }
 
 /// The data sheet of a node: that of the file, else the one that fits the identity.

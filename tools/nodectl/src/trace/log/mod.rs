@@ -81,7 +81,8 @@ impl LogReader {
     /// # Errors
     /// The line is no record.
     pub fn line(&mut self, line: &str) -> Result<Option<(Instant, Record)>, NotARecord> {
-        let text = line.trim();
+        // Some editors begin a file with a byte order mark.
+        let text = line.trim_start_matches('\u{FEFF}').trim();
         if text.is_empty() || (self.is_after_error && line.starts_with('\t')) || self.is_head(text) {
             return Ok(None);
         }
@@ -172,6 +173,15 @@ mod tests {
         assert_eq!(found.len(), 2);
         assert!(matches!(&found[0].1, Record::Foreign(Foreign { kind: ForeignKind::Error, .. })));
         assert_eq!(found[1].1, frame(0x701, &[5]));
+    }
+
+    #[test]
+    fn a_byte_order_mark_before_a_log_is_skipped() {
+        for log in ["(1.0) vcan0 701#05", "can0 701 [1] 05", "# night\n(1.0) can0 701#05"] {
+            assert_eq!(records(&format!("\u{FEFF}{log}")), records(log), "{log}");
+        }
+        let log = ";$FILEVERSION=1.1\n;   ---\n     1)        12.3  Rx         0701  1  05";
+        assert_eq!(records(&format!("\u{FEFF}{log}")), records(log));
     }
 
     #[test]

@@ -24,8 +24,12 @@ export function dcfTools(bus, onApplied) {
 }
 
 async function save(bus, all, result, steps) {
-  const file = await result.of("reading the node", bus.request("dcf", { node: bus.chosen, all }, steps), ({ name }) => `${name} is saved`);
+  const file = await result.of("reading the node", bus.request("dcf", { node: bus.chosen, all }, steps), saved);
   if (file) offer(file.name, file.text);
+}
+
+function saved({ name, left_out: out }) {
+  return out.length ? `${name} is saved without ${out.join(", ")}: a file cannot have these texts` : `${name} is saved`;
 }
 
 /** Shows the changes first; nothing is written before the user has seen them. */

@@ -2,17 +2,17 @@
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
-use eds::{Commissioning, Eds, Reals};
+use eds::{Eds, Reals};
 use serde_json::{Value as Json, json};
 
 use super::{Context, Job};
-use crate::cli::dump::{bring, mismatch};
+use crate::cli::dump::{bring, commissioning, mismatch};
 use crate::cli::serve::request::Apply;
 use crate::cli::session::loss;
 use crate::cli::store::{Group, Order, sign};
 use crate::cli::{Failure, Session};
 use crate::configuration::{Configuration, Difference};
-use crate::object::at;
+use crate::object::Place;
 
 /// Reads the data sheet and the configuration of a node.
 fn read(context: &mut Context, node: NodeId) -> Result<(Eds, Configuration), Failure> {
@@ -56,13 +56,11 @@ pub(super) fn differences(node: NodeId) -> Job {
 pub(super) fn dcf(node: NodeId, all: bool) -> Job {
     Job::of_node(node, move |context| {
         let (sheet, values) = read(context, node)?;
-        let mut file = values.to_sheet(&sheet, node, all);
-        let serial = context.session.word(node, at(0x1018, 4))?.unwrap_or(0);
-        let bit_rate = context.session.options.known_bit_rate();
-        file.commissioning = Some(Commissioning { node_id: node.get(), bit_rate, serial });
+        let commissioning = commissioning(&mut context.session, node)?;
         let name = format!("node{}.dcf", node.get());
-        let text = file.to_dcf(&name, Reals::Decimal);
-        Ok(json!({ "name": name, "text": text }))
+        let dcf = values.to_dcf(&sheet, &name, commissioning, all, Reals::Decimal);
+        let left_out: Vec<String> = dcf.left_out.iter().map(|at| Place(*at).to_string()).collect();
+        Ok(json!({ "name": name, "text": dcf.text, "left_out": left_out }))
     })
 }
 
@@ -78,7 +76,7 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
     Ok(Job::of_node(node, move |context| {
         let mismatch = mismatch(&mut context.session, node, &sheet)?;
         if let Some(words) = mismatch.filter(|_| !how.force) {
-            return Err(Failure::Usage(format!("the file is {words}")));
+            return Err(Failure::Usage(words));
         }
         let wanted = Configuration::of_sheet(&sheet, node);
         if how.dry_run {
