@@ -62,6 +62,7 @@ impl Settings {
 /// A TPDO and its timers. Only valid TPDOs are in the chains; for a TPDO that is not valid, only `configure` and `stop`
 /// may be called.
 #[derive(Debug)]
+#[allow(clippy::struct_excessive_bools)] // Independent flags.
 pub struct Tpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
