@@ -20,6 +20,7 @@ mod process;
 mod rules;
 mod safety;
 mod simulate;
+mod slow_bus;
 mod trace;
 mod transfers;
 mod update;
