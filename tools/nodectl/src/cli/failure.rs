@@ -182,7 +182,7 @@ fn sdo_code(error: &sdo::Error) -> u8 {
 /// The exit code for a node that was not updated.
 pub(super) fn update_code(error: &update::Error) -> u8 {
     match error {
-        update::Error::Sdo(error) => sdo_code(error),
+        update::Error::Sdo(error) | update::Error::Mixed(error) => sdo_code(error),
         update::Error::Closed { .. } => 1,
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Left { .. } | update::Error::Lost { .. } => 3,

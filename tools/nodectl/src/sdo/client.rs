@@ -6,6 +6,7 @@ use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
 
 use super::channel::Via;
+use super::command::Command;
 use super::memory::Memory;
 use super::{Cause, Error, Options};
 use crate::network::Network;
@@ -67,6 +68,16 @@ impl<'n> Client<'n> {
         let mut progress = news(progress);
         let mut download = Download::new(self.node, at, value, self.patience(value));
         self.run(at, &mut download, |download| progress(download.transferred()))
+    }
+
+    /// Writes one byte that the server need not acknowledge, because it restarts its node. The request is sent once, and a
+    /// missing answer is no error.
+    ///
+    /// # Errors
+    /// The node refuses, the bus is lost, or another client uses the server all the time.
+    pub fn command(&mut self, at: Multiplexer, value: u8) -> Result<(), Error> {
+        let mut command = Command::new(self.node, at, value, self.options.timeout);
+        self.run(at, &mut command, |_| ())
     }
 
     /// Reads an object in blocks.

@@ -13,6 +13,10 @@ pub enum Error {
     /// A transfer failed.
     #[error(transparent)]
     Sdo(#[from] sdo::Error),
+    /// The download has failed after a part of it had arrived, and the node has nothing against the program: frames of two
+    /// transfers were mixed up.
+    #[error(transparent)]
+    Mixed(sdo::Error),
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -107,6 +111,23 @@ impl Error {
             Error::Left { .. } => true,
             // A node that has not heard this program for a while is lost, too.
             Error::Sdo(error) => error.is_silence() || error.abort().is_some_and(AbortCode::is_time_out),
+            _ => self.is_bus_lost(),
+        }
+    }
+
+    /// Whether frames of another client, or late ones, were in the way, so that another try may succeed.
+    pub(super) fn is_disturbance(&self) -> bool {
+        match self {
+            Error::Mixed(_) => true,
+            Error::Sdo(error) => error.may_pass() && !self.can_continue(),
+            _ => false,
+        }
+    }
+
+    /// Whether the bus is lost.
+    pub(super) fn is_bus_lost(&self) -> bool {
+        match self {
+            Error::Sdo(error) => error.is_bus_lost(),
             Error::Bus(error) => matches!(error, BusError::Lost(_)),
             _ => false,
         }

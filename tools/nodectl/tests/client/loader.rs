@@ -85,6 +85,8 @@ pub(crate) struct Flash {
     copied: Option<Instant>,
     /// The loader starts its program by itself just before it receives this command.
     pub(crate) starts_before: Option<u8>,
+    /// How often the node loses its power just after it has accepted the command to stop its program.
+    pub(crate) power_cuts: usize,
     now: Instant,
 }
 
@@ -105,7 +107,10 @@ impl Flash {
         self.commands.push(command);
         self.runs |= self.starts_before.take_if(|before| *before == command).is_some();
         match (command, self.runs) {
-            (0, true) => self.next = Some(false),
+            (0, true) => {
+                self.next = Some(self.power_cuts > 0);
+                self.power_cuts = self.power_cuts.saturating_sub(1);
+            }
             (0, false) => (),
             (1, false) if self.program.is_empty() => return Err(Abort::DeviceState),
             (1, false) => {
@@ -198,6 +203,7 @@ impl Loader {
             next: None,
             copied: None,
             starts_before: None,
+            power_cuts: 0,
             now: Instant(0),
         };
         Loader { id, device: Device::new(&DICTIONARY, id, flash), up: Instant(0), is_started: false }

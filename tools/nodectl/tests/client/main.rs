@@ -24,4 +24,5 @@ mod slow_bus;
 mod trace;
 mod transfers;
 mod update;
+mod update_disturbed;
 mod wire;

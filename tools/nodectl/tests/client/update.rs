@@ -9,7 +9,7 @@ use crate::wire::{Fate, Wire};
 
 /// The reports of an update.
 #[derive(Default)]
-struct Diary {
+pub(crate) struct Diary {
     steps: Vec<(u8, Step)>,
     done: usize,
 }
@@ -36,31 +36,31 @@ type Results = Vec<(NodeId, Result<Outcome, Error>)>;
 const ALL: [Step; 6] = [Step::Identify, Step::Stop, Step::Clear, Step::Download, Step::Verify, Step::Start];
 
 /// A program of this version.
-fn program(version: &str) -> Vec<u8> {
+pub(crate) fn program(version: &str) -> Vec<u8> {
     let mut program = format!("{version}\n").into_bytes();
     program.extend((0..20_000_u32).map(|byte| (byte % 253) as u8));
     program
 }
 
-fn image(version: Version) -> Image {
+pub(crate) fn image(version: Version) -> Image {
     let bytes = program(&version.to_string());
     let info = ImageInfo { board: 42, version, identification: identification(&bytes) };
     Image { bytes, info: Some(info) }
 }
 
 const OLD: Version = Version { major: 1, minor: 0, patch: 0 };
-const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
+pub(crate) const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
 
-fn options() -> Options {
+pub(crate) fn options() -> Options {
     let sdo = sdo::Options { timeout: Duration::from_millis(500), ..sdo::Options::default() };
     Options { sdo, patience: Duration::from_millis(20_000), force: false, key: None, confirm: true }
 }
 
-fn nodes(ids: &[u8]) -> Vec<NodeId> {
+pub(crate) fn nodes(ids: &[u8]) -> Vec<NodeId> {
     ids.iter().filter_map(|&id| NodeId::new(id)).collect()
 }
 
-fn fleet(ids: &[u8]) -> Wire<Vec<Loader>> {
+pub(crate) fn fleet(ids: &[u8]) -> Wire<Vec<Loader>> {
     Wire::new(ids.iter().map(|&id| Loader::new(id, &program("1.0.0"))).collect())
 }
 
@@ -69,7 +69,7 @@ fn run(wire: &Wire<Vec<Loader>>, ids: &[u8], image: &Image, options: &Options, d
 }
 
 /// Updates node 3 alone.
-fn one(
+pub(crate) fn one(
     wire: &Wire<Vec<Loader>>,
     image: &Image,
     options: &Options,
@@ -79,7 +79,7 @@ fn one(
     result
 }
 
-fn commands(wire: &Wire<Vec<Loader>>) -> Vec<u8> {
+pub(crate) fn commands(wire: &Wire<Vec<Loader>>) -> Vec<u8> {
     wire.station(|loaders| loaders[0].flash().commands.clone())
 }
 
@@ -106,7 +106,7 @@ fn the_sequence_of_cia_302() {
 /// The key of a node that demands an authorisation.
 const KEY: [u8; 32] = [0x5A; 32];
 
-fn with_key() -> Options {
+pub(crate) fn with_key() -> Options {
     Options { key: Some("5A".repeat(32).parse().unwrap()), ..options() }
 }
 
