@@ -28,6 +28,9 @@ const PAUSE: Duration = Duration::from_millis(30);
 /// How long to wait for such a pause. Clients that never pause have to let others in between two transfers.
 const WITHOUT_PAUSE: Duration = Duration::from_millis(1000);
 
+/// The first byte of an SDO abort message (CiA 301, 7.2.4.3.17).
+const ABORT: u8 = 0x80;
+
 /// The number of frames in a log; later frames are not logged.
 const LOGGED: usize = 100_000;
 
@@ -341,6 +344,7 @@ impl Network {
             let step = service.next(self.now());
             progress(service);
             match step {
+                Step::Send(frame) if self.would_end_another(&frame) => {}
                 Step::Send(frame) => self.send(&frame)?,
                 Step::Wait(until) => {
                     if let Some(received) = self.fetch(until)? {
@@ -350,6 +354,11 @@ impl Network {
                 Step::Done(output) => return Ok(output),
             }
         }
+    }
+
+    /// Whether a frame is an abort message that would end the transfer of another client: it has begun in the same moment.
+    fn would_end_another(&self, frame: &Frame) -> bool {
+        frame.data().first() == Some(&ABORT) && self.others.has_transfer(frame.id(), self.now())
     }
 
     /// Passes the frames that have arrived to the service.

@@ -1,7 +1,7 @@
 //! The update of one node. The job keeps its state while the node is lost, so that the update can continue afterwards.
 
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Duration, NodeId};
+use canopen::{Duration, Instant, NodeId};
 
 use super::image::version;
 use ::update::Refusal;
@@ -27,7 +27,7 @@ const CLEARS: usize = 5;
 /// How often a run continues after the node was lost.
 const RESUMES: usize = 10;
 /// How often a run continues after another client was in the way.
-const DISTURBANCES: usize = 3;
+const DISTURBANCES: usize = 5;
 
 /// The options of an update.
 #[derive(Clone, Copy, Debug)]
@@ -339,10 +339,11 @@ impl<'a> Job<'a> {
             watcher.progress(node, done, total);
         });
         let Err(error) = blocks else { return Ok(()) };
-        let is_disturbed = network.has_other_request_since(node, begin) || arrived > 0;
+        let is_protocol = error.abort().is_some_and(sdo::AbortCode::is_protocol);
+        let is_disturbed = network.has_other_request_since(node, begin);
         let is_first = !std::mem::replace(&mut self.has_failed, true);
-        if !error.abort().is_some_and(sdo::AbortCode::is_protocol) || is_disturbed && is_first {
-            return Err(self.reason(network, error, is_disturbed));
+        if !is_protocol || is_disturbed || arrived > 0 && is_first {
+            return Err(self.reason(network, error, begin, arrived));
         }
         if arrived > 0 {
             self.clear(network, watcher)?;
@@ -352,12 +353,12 @@ impl<'a> Job<'a> {
             arrived = done;
             watcher.progress(node, done, total);
         });
-        segments.map_err(|error| self.reason(network, error, arrived > 0))
+        segments.map_err(|error| self.reason(network, error, begin, arrived))
     }
 
     /// Why the download has failed. The status of the node has the details, which the abort code has not. Without a reason in
     /// the status, the frames of the download may have been mixed up with those of another client.
-    fn reason(&self, network: &mut Network, error: sdo::Error, is_disturbed: bool) -> Error {
+    fn reason(&self, network: &mut Network, error: sdo::Error, begin: Instant, arrived: usize) -> Error {
         // The node also answers the segments that were on their way.
         let _ = network.pause(POLL);
         let is_refused = |status: &Status| !status.busy && status.code != 0;
@@ -365,7 +366,11 @@ impl<'a> Job<'a> {
         let status = code.and_then(|_| self.program(network).status().ok().flatten());
         match status.filter(is_refused) {
             Some(status) => Error::Flash { node: self.node, status },
-            None if is_disturbed && code.is_some_and(is_of_a_mixture) => Error::Mixed(error),
+            // The node may have taken a segment for any request.
+            None if code.is_some() && network.has_other_request_since(self.node, begin) => {
+                Error::Mixed(error)
+            }
+            None if arrived > 0 && code.is_some_and(is_of_a_mixture) => Error::Mixed(error),
             None => error.into(),
         }
     }

@@ -26,7 +26,7 @@ impl Watcher for Diary {
 }
 
 impl Diary {
-    fn steps_of(&self, node: u8) -> Vec<Step> {
+    pub(crate) fn steps_of(&self, node: u8) -> Vec<Step> {
         self.steps.iter().filter(|(of, _)| *of == node).map(|(_, step)| *step).collect()
     }
 }

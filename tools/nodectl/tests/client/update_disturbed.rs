@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use canopen::{Duration, Frame, Instant, Transmit};
 use nodectl::bus::Station;
-use nodectl::update::{Error, update};
+use nodectl::update::{Error, Step, update};
 
 use crate::loader::Loader;
 use crate::update::{Diary, NEW, commands, fleet, image, nodes, one, options, program, with_key};
@@ -111,4 +111,24 @@ fn answers_to_another_master_do_not_end_an_update_and_its_transfers_are_not_abor
     assert_eq!(result.unwrap().new_version.as_deref(), Some("1.1.0"));
     assert_eq!(wire.station(|visited| visited.loader.flash().commands.clone()), [0, 3, 1]);
     assert_eq!(aborts.get(), 0);
+}
+
+/// A server that takes segments twice sees more data than announced, or another CRC.
+#[test]
+fn a_download_that_was_mixed_up_is_begun_again() {
+    for code in [0x0607_0012_u32, 0x0504_0004, 0x0504_0001] {
+        let (wire, mut diary) = (fleet(&[3]), Diary::default());
+        let mut count = 0;
+        wire.disturb(move |frame| {
+            count += usize::from(frame.data().first() == Some(&0xA2));
+            if count != 3 || frame.data()[0] != 0xA2 {
+                return Fate::Arrives;
+            }
+            let [a, b, c, d] = code.to_le_bytes();
+            Fate::BecomesAnother(Frame::new(0x583, &[0x80, 0x50, 0x1F, 1, a, b, c, d]).expect("a frame"))
+        });
+        let outcome = one(&wire, &image(NEW), &options(), &mut diary).unwrap();
+        assert_eq!(outcome.new_version.as_deref(), Some("1.1.0"), "{code:X}");
+        assert!(!diary.steps_of(3).contains(&Step::DownloadSegments), "{code:X}");
+    }
 }
