@@ -82,6 +82,8 @@ pub struct Network {
     gate: Box<dyn FnMut() -> Gate>,
     /// The time that was spent at the gate.
     waited: Duration,
+    /// When the bus was opened.
+    opened: Instant,
 }
 
 impl Network {
@@ -93,6 +95,7 @@ impl Network {
         mut opener: impl FnMut() -> Result<Box<dyn Bus>, BusError> + 'static,
     ) -> Result<Network, BusError> {
         let bus = opener()?;
+        let opened = bus.now();
         let (opener, kept) = (Box::new(opener), VecDeque::new());
         Ok(Network {
             opener,
@@ -105,6 +108,7 @@ impl Network {
             heard: BTreeMap::new(),
             gate: Box::new(|| Gate::Open),
             waited: Duration(0),
+            opened,
         })
     }
 
@@ -147,7 +151,7 @@ impl Network {
     pub fn reopen(&mut self) -> Result<(), BusError> {
         self.bus = (self.opener)()?;
         self.kept.clear();
-        self.newest = None;
+        (self.newest, self.opened) = (None, self.bus.now());
         Ok(())
     }
 
@@ -230,7 +234,10 @@ impl Network {
         let pause_until = begin + WITHOUT_PAUSE;
         loop {
             let now = self.now();
-            let left = self.others.quiet(node, now).map_or(0, |quiet| PAUSE.0.saturating_sub(quiet.0));
+            // Before the first request, the bus is listened to: a transfer may run already.
+            let silence =
+                self.others.quiet(node, now).unwrap_or(Duration(now.0.saturating_sub(self.opened.0)));
+            let left = PAUSE.0.saturating_sub(silence.0);
             let is_busy = self.others.is_busy(node, now);
             // Without an answer, the frames may be the segments of a block whose begin was not heard.
             let has_waited =
@@ -391,6 +398,27 @@ impl Network {
         let until = self.now() + time;
         self.wait(until, |_| None::<()>)?;
         self.steadiness.on_pause(until, self.now());
+        Ok(())
+    }
+
+    /// Lets time pass until the SDO server of a node has sent nothing for the time `quiet`, for `limit` at most. The frames that
+    /// arrive are kept.
+    ///
+    /// # Errors
+    /// The bus is lost.
+    pub(crate) fn wait_for_silence(
+        &mut self,
+        node: NodeId,
+        quiet: Duration,
+        limit: Duration,
+    ) -> Result<(), BusError> {
+        let (response, end) = (self.channel(node).response, self.now() + limit);
+        while self.now() < end {
+            let until = self.now() + quiet;
+            if self.wait(until, |frame| (frame.id() == response).then_some(()))?.is_none() {
+                break;
+            }
+        }
         Ok(())
     }
 

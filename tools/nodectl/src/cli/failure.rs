@@ -23,7 +23,7 @@ Exit codes:
   3  no answer in time, or one against the protocol
   4  the bus cannot be opened, or is lost
   5  the node did not accept the new program, or has another than it was given
-  6  the program is not for this node; nothing was changed
+  6  the program is not for this node, or that of the node is on trial; no program was erased
   7  a file cannot be read or written
   8  two configurations differ (diff)
   9  the device does not conform (check)
@@ -190,6 +190,7 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Board { .. }
         | update::Error::Older { .. }
         | update::Error::OnTrial { .. }
+        | update::Error::OtherDownload { .. }
         | update::Error::NoTrial { .. } => 6,
     }
 }

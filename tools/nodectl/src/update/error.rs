@@ -73,6 +73,15 @@ pub enum Error {
         /// The node.
         node: NodeId,
     },
+    /// The loader had a complete program of another download, which has been started and is on trial now.
+    #[error(
+        "node {}: its bootloader had a complete program of another download, which runs now; its program is on trial; confirm it or roll it back first (nodectl confirm, nodectl rollback)",
+        .node.get()
+    )]
+    OtherDownload {
+        /// The node.
+        node: NodeId,
+    },
     /// The program of the node is on no trial, so there is nothing to confirm or to roll back.
     #[error("node {}: its program is not on trial", .node.get())]
     NoTrial {

@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use canopen::{Duration, NodeId};
 
-use super::job::{Job, Patience};
+use super::job::Job;
+use super::waiting::Patience;
 use super::{Error, Image, Options, Outcome, Watcher};
 use crate::Network;
 

@@ -3,23 +3,22 @@
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Duration, Instant, NodeId};
 
-use super::image::version;
 use ::update::Refusal;
 
+use super::image::version;
+use super::waiting::{POLL, Patience, RESTART, pauses, wait_for_return, wait_until_running};
 use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher, trial};
 use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::{Network, value};
 
-/// How long a node may take to restart.
-pub(super) const RESTART: Duration = Duration::from_millis(15_000);
 /// How long a program may still run after the command to stop it. A node that has lost its power in the meantime runs its
 /// program again.
 const STOP: Duration = Duration::from_millis(5_000);
 /// How often a node is told to stop its program.
 const STOPS: usize = 3;
-/// The time between two requests to a busy node.
-pub(super) const POLL: Duration = Duration::from_millis(100);
+/// How long the rest of a broken download may take to arrive.
+const REST: Duration = Duration::from_millis(4_000);
 /// How long a node may take to erase the flash, or to check the program.
 const FLASH: Duration = Duration::from_millis(60_000);
 /// The number of tries to clear the flash when the node refuses although its flash is not busy.
@@ -86,13 +85,6 @@ enum Progress {
     Found,
 }
 
-/// How long to wait for what is lost.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Patience {
-    pub(super) node: Duration,
-    pub(super) bus: Duration,
-}
-
 /// The update of one node.
 pub(super) struct Job<'a> {
     pub(super) node: NodeId,
@@ -127,23 +119,26 @@ impl<'a> Job<'a> {
         watcher: &mut dyn Watcher,
     ) -> Result<Outcome, Error> {
         let (mut resumes, mut disturbances) = (RESUMES, DISTURBANCES);
-        loop {
+        for pause in pauses().take(RESUMES + DISTURBANCES) {
             match self.attempt(network, watcher) {
                 // A node that has never answered does not count as lost.
                 Err(error) if error.can_continue() && self.is_lost(&error) && resumes > 0 => {
                     resumes -= 1;
                     watcher.step(self.node, Step::Lost);
-                    self.wait_for_return(network, patience)?;
+                    wait_for_return(network, self.node, self.options.sdo, patience)?;
                     watcher.step(self.node, Step::Back);
                 }
                 Err(error) if error.is_disturbance() && disturbances > 0 => {
                     disturbances -= 1;
                     watcher.step(self.node, Step::Disturbed);
-                    self.wait_for_return(network, patience)?;
+                    wait_for_return(network, self.node, self.options.sdo, patience)?;
                 }
                 result => return result,
             }
+            // A bus that is lost in the pause is noticed afterwards.
+            let _ = network.pause(pause);
         }
+        self.attempt(network, watcher)
     }
 
     /// Whether an error means that something was there before.
@@ -211,7 +206,7 @@ impl<'a> Job<'a> {
     fn is_another(&self, network: &mut Network, expected: u32, found: u32) -> Result<Error, Error> {
         let node = self.node;
         if self.progress == Progress::Found {
-            return Ok(Error::OnTrial { node });
+            return Ok(Error::OtherDownload { node });
         }
         Ok(match self.program(network).status()? {
             Some(status) if !is_good(status) => Error::Flash { node, status },
@@ -247,6 +242,10 @@ impl<'a> Job<'a> {
         if is_running && self.image.info.is_some() && self.program(network).is_on_trial()? {
             return Err(Error::OnTrial { node: self.node });
         }
+        // A node that is open now is closed when the new program runs, and the key is needed to confirm it.
+        if self.image.info.is_some() && self.options.key.is_none() && self.program(network).is_guarded()? {
+            return Err(Error::Closed { node: self.node });
+        }
         self.open(network)?;
         if is_running {
             watcher.step(self.node, Step::Stop);
@@ -256,7 +255,7 @@ impl<'a> Job<'a> {
         self.progress = match (cleared, self.progress) {
             // The download was complete when the node was lost, so the program on trial is the new one.
             (Err(Error::OnTrial { .. }), Progress::Cleared) => Progress::Complete,
-            (Err(Error::OnTrial { .. }), _) if !is_running && self.image.info.is_some() => Progress::Found,
+            (Err(Error::OnTrial { .. }), _) if self.image.info.is_some() => Progress::Found,
             (cleared, _) => {
                 cleared?;
                 self.progress = Progress::Cleared;
@@ -360,7 +359,7 @@ impl<'a> Job<'a> {
     /// the status, the frames of the download may have been mixed up with those of another client.
     fn reason(&self, network: &mut Network, error: sdo::Error, begin: Instant, arrived: usize) -> Error {
         // The node also answers the segments that were on their way.
-        let _ = network.pause(POLL);
+        let _ = network.wait_for_silence(self.node, POLL, REST);
         let is_refused = |status: &Status| !status.busy && status.code != 0;
         let code = error.abort().filter(|code| !code.is_time_out());
         let status = code.and_then(|_| self.program(network).status().ok().flatten());
@@ -398,30 +397,6 @@ impl<'a> Job<'a> {
         what: &'static str,
     ) -> Result<(), Error> {
         wait_until_running(network, self.node, self.options.sdo, (wanted, limit), what)
-    }
-
-    /// Waits for a lost node. Opens the bus again if the bus is lost, too.
-    fn wait_for_return(&self, network: &mut Network, patience: Patience) -> Result<(), Error> {
-        let bus_until = network.now() + patience.bus;
-        let mut until = network.now() + patience.node;
-        loop {
-            match self.program(network).is_running() {
-                Ok(_) => return Ok(()),
-                // Without a bus, no other node can have its turn. The node has its time once the bus is open.
-                Err(error) if error.is_bus_lost() => {
-                    if !reopen(network) && network.now() >= bus_until {
-                        return Err(error.into());
-                    }
-                    until = bus_until.min(network.now() + patience.node);
-                }
-                // After bus-off, node and adapter send the frames of the broken transfer that they have kept.
-                Err(error) if error.may_pass() => network.pause(POLL)?,
-                Err(error) => return Err(error.into()),
-            }
-            if network.now() >= until {
-                return Err(Error::Lost { node: self.node, patience: patience.node.0 / 1_000_000 });
-            }
-        }
     }
 
     /// The state of a node whose loader is not busy. One that lost its power in a copy finishes the copy first, and has
@@ -482,40 +457,6 @@ impl<'a> Job<'a> {
     fn program<'n>(&self, network: &'n mut Network) -> Program<'n> {
         Program::new(network, self.node, self.options.sdo)
     }
-}
-
-/// Waits until a node is back from a restart, with or without a running program as `wanted`.
-pub(super) fn wait_until_running(
-    network: &mut Network,
-    node: NodeId,
-    options: sdo::Options,
-    (wanted, limit): (bool, Duration),
-    what: &'static str,
-) -> Result<(), Error> {
-    let begin = network.now();
-    loop {
-        let error = match Program::new(network, node, options).is_running() {
-            Ok(is_running) if is_running == wanted => return Ok(()),
-            Ok(_) => None,
-            Err(error) if error.may_pass() && !error.is_bus_lost() => Some(error),
-            Err(error) => return Err(error.into()),
-        };
-        let limit = if error.is_some() { RESTART } else { limit };
-        if network.now() >= begin + limit {
-            return Err(error.map_or(Error::Stuck { node, what }, Error::Sdo));
-        }
-        network.pause(POLL)?;
-    }
-}
-
-/// Tries to open the bus, and returns whether it is open. After a failure it pauses, because the bus may come back; the caller
-/// limits the whole time.
-fn reopen(network: &mut Network) -> bool {
-    let is_open = network.reopen().is_ok();
-    if !is_open {
-        std::thread::sleep(std::time::Duration::from_micros(POLL.0));
-    }
-    is_open
 }
 
 /// Whether a server aborts with this code when it takes frames of another transfer for segments, or segments twice.

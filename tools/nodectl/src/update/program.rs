@@ -115,10 +115,22 @@ impl<'n> Program<'n> {
     /// # Errors
     /// SDO errors.
     pub fn is_closed(&mut self) -> Result<bool, Error> {
+        Ok(self.authorisation()? == 1)
+    }
+
+    /// Whether the node demands an authorisation after each of its starts. Only for nodes of this project.
+    ///
+    /// # Errors
+    /// SDO errors.
+    pub fn is_guarded(&mut self) -> Result<bool, Error> {
+        Ok(self.authorisation()? != 0)
+    }
+
+    fn authorisation(&mut self) -> Result<u8, Error> {
         match self.read(AUTHORISATION_STATE) {
-            Ok(state) => Ok(state.first() == Some(&1)),
+            Ok(state) => Ok(state.first().copied().unwrap_or(0)),
             // Programs of the time before authorisations, and bootloaders without a key, have no such object.
-            Err(error) if error.is_absent() => Ok(false),
+            Err(error) if error.is_absent() => Ok(0),
             Err(error) => Err(error),
         }
     }

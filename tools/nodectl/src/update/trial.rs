@@ -4,7 +4,7 @@ use canopen::{Duration, NodeId};
 
 use ::update::{Reason, Refusal};
 
-use super::job::{POLL, RESTART, wait_until_running};
+use super::waiting::{POLL, RESTART, wait_until_running};
 use super::{AuthorisationKey, Command, Error, Program, Status};
 use crate::Network;
 use crate::sdo::Options;

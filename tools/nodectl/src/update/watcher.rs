@@ -38,7 +38,7 @@ pub enum Step {
     Lost,
     /// The node is back.
     Back,
-    /// Another client was in the way: the update continues in the state of the node.
+    /// Frames of another client, or late ones, were in the way: the update continues in the state of the node.
     Disturbed,
 }
 
@@ -56,7 +56,7 @@ impl fmt::Display for Step {
             Step::Confirm => "confirm",
             Step::Lost => "lost, waiting",
             Step::Back => "back",
-            Step::Disturbed => "disturbed by another client",
+            Step::Disturbed => "disturbed, trying again",
         })
     }
 }

@@ -55,6 +55,9 @@ const RESTART: Duration = Duration::from_millis(200);
 const ERASE: Duration = Duration::from_millis(1500);
 const CHECK: Duration = Duration::from_millis(100);
 
+/// The value of 1F57h of a program on trial: code 73.
+const ON_TRIAL: u32 = 73 << 1;
+
 /// The program, and the state of the loader.
 #[derive(Clone, Debug)]
 pub(crate) struct Flash {
@@ -85,6 +88,8 @@ pub(crate) struct Flash {
     copied: Option<Instant>,
     /// The loader starts its program by itself just before it receives this command.
     pub(crate) starts_before: Option<u8>,
+    /// The program that another master downloads as soon as the program is stopped. It is on trial and cannot be cleared.
+    pub(crate) other_download: Option<Vec<u8>>,
     /// How often the node loses its power just after it has accepted the command to stop its program.
     pub(crate) power_cuts: usize,
     now: Instant,
@@ -92,7 +97,7 @@ pub(crate) struct Flash {
 
 impl Flash {
     /// Makes a new challenge at a start.
-    fn challenge(&mut self, is_answered: bool) {
+    pub(crate) fn challenge(&mut self, is_answered: bool) {
         let noise = [self.now.0 as u32, self.commands.len() as u32];
         let pair = self.key.map(|key| Pair::new(&key, &noise, SERIAL_NUMBER));
         self.authorisation = Authorisation::new(pair, is_answered);
@@ -109,6 +114,9 @@ impl Flash {
         match (command, self.runs) {
             (0, true) => {
                 self.next = Some(self.power_cuts > 0);
+                if let Some(program) = self.other_download.take() {
+                    (self.program, self.status, self.is_on_trial) = (program, ON_TRIAL, true);
+                }
                 self.power_cuts = self.power_cuts.saturating_sub(1);
             }
             (0, false) => (),
@@ -119,6 +127,7 @@ impl Flash {
                     (self.program, self.status) = (program, 0x0001_0090);
                 }
             }
+            (3, false) if self.status == ON_TRIAL => return Err(Abort::DeviceState),
             (3, false) => {
                 (self.program, self.status, self.erased) = (Vec::new(), 0, self.erased + 1);
                 self.busy_until = self.now + ERASE;
@@ -204,6 +213,7 @@ impl Loader {
             copied: None,
             starts_before: None,
             power_cuts: 0,
+            other_download: None,
             now: Instant(0),
         };
         Loader { id, device: Device::new(&DICTIONARY, id, flash), up: Instant(0), is_started: false }

@@ -127,8 +127,13 @@ fn the_key_holder_updates_and_confirms_a_guarded_node() {
 fn without_the_key_of_a_node_nothing_is_changed() {
     let (wire, mut diary) = (fleet(&[3]), Diary::default());
     wire.station(|loaders| loaders[0].set_key(KEY));
-    let error = one(&wire, &image(NEW), &options(), &mut diary).unwrap_err();
-    assert!(matches!(error, Error::Closed { .. }), "{error}");
+    // Also where another master has opened the node: it is closed again when the new program is to be confirmed.
+    for is_open in [false, true] {
+        wire.station(|loaders| loaders[0].flash().challenge(is_open));
+        let error = one(&wire, &image(NEW), &options(), &mut diary).unwrap_err();
+        assert!(matches!(error, Error::Closed { .. }), "{is_open}: {error}");
+    }
+    wire.station(|loaders| loaders[0].flash().challenge(false));
     let other = Options { key: Some("5B".repeat(32).parse().unwrap()), ..options() };
     let error = one(&wire, &image(NEW), &other, &mut diary).unwrap_err();
     assert!(error.to_string().contains("Program authorisation: response"), "{error}");

@@ -132,3 +132,19 @@ fn a_download_that_was_mixed_up_is_begun_again() {
         assert!(!diary.steps_of(3).contains(&Step::DownloadSegments), "{code:X}");
     }
 }
+
+/// Another master has downloaded its program after this one has stopped the node.
+#[test]
+fn a_node_with_the_complete_download_of_another_master_is_started() {
+    for version in ["1.1.0", "1.2.0"] {
+        let wire = fleet(&[3]);
+        wire.station(|loaders| loaders[0].flash().other_download = Some(program(version)));
+        let result = one(&wire, &image(NEW), &options(), &mut Diary::default());
+        assert_eq!(commands(&wire), [0, 3, 1], "{version}");
+        match (version, result) {
+            ("1.1.0", Ok(outcome)) => assert_eq!(outcome.new_version.as_deref(), Some("1.1.0")),
+            ("1.2.0", Err(Error::OtherDownload { .. })) => {}
+            (_, result) => panic!("{version}: {result:?}"),
+        }
+    }
+}
