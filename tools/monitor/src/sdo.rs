@@ -57,6 +57,8 @@ struct Transfer {
     block_size: u8,
     block: Vec<[u8; 7]>,
     has_last: bool,
+    /// The present block has begun before the server has acknowledged that nothing of the rest of the block before counts.
+    is_early: bool,
     /// Whether both sides check a CRC, and the one that the client has sent.
     has_crc: bool,
     crc: u16,
@@ -276,6 +278,8 @@ impl Channel {
     fn take_segment(&mut self, data: [u8; 8]) {
         let Some(transfer) = &mut self.transfer else { return };
         let sequence = data[0] & 0x7F;
+        transfer.is_early |=
+            self.expect == Expect::BlockAcknowledge && transfer.block.is_empty() && sequence == 1;
         if usize::from(sequence) == transfer.block.len() + 1 {
             transfer.block.push([data[1], data[2], data[3], data[4], data[5], data[6], data[7]]);
             transfer.has_last = data[0] & 0x80 != 0;
@@ -388,9 +392,15 @@ impl Channel {
                 if command != 0xA2 || usize::from(data[1]) > known || !(1..=127).contains(&data[2]) {
                     return Err(format!("{:02X?} acknowledges a block of {known} segments", &data[..3]));
                 }
+                transfer.block_size = data[2];
+                if std::mem::take(&mut transfer.is_early) && data[1] == 0 {
+                    if !transfer.has_last && known < transfer.block_size.into() {
+                        self.expect = Expect::Nothing;
+                    }
+                    return Ok(None);
+                }
                 let whole = usize::from(data[1]) == known;
                 transfer.acknowledge(data[1]);
-                transfer.block_size = data[2];
                 transfer.has_last &= whole;
                 false
             }
@@ -455,6 +465,7 @@ impl Transfer {
             block_size: 0,
             block: Vec::new(),
             has_last: false,
+            is_early: false,
             has_crc: false,
             crc: 0,
             may_switch: false,

@@ -28,6 +28,9 @@ const PAUSE: Duration = Duration::from_millis(30);
 /// How long to wait for such a pause. Clients that never pause have to let others in between two transfers.
 const WITHOUT_PAUSE: Duration = Duration::from_millis(1000);
 
+/// The first byte of an SDO abort message (CiA 301, 7.2.4.3.17).
+const ABORT: u8 = 0x80;
+
 /// The number of frames in a log; later frames are not logged.
 const LOGGED: usize = 100_000;
 
@@ -79,6 +82,8 @@ pub struct Network {
     gate: Box<dyn FnMut() -> Gate>,
     /// The time that was spent at the gate.
     waited: Duration,
+    /// When the bus was opened.
+    opened: Instant,
 }
 
 impl Network {
@@ -90,6 +95,7 @@ impl Network {
         mut opener: impl FnMut() -> Result<Box<dyn Bus>, BusError> + 'static,
     ) -> Result<Network, BusError> {
         let bus = opener()?;
+        let opened = bus.now();
         let (opener, kept) = (Box::new(opener), VecDeque::new());
         Ok(Network {
             opener,
@@ -102,6 +108,7 @@ impl Network {
             heard: BTreeMap::new(),
             gate: Box::new(|| Gate::Open),
             waited: Duration(0),
+            opened,
         })
     }
 
@@ -144,7 +151,7 @@ impl Network {
     pub fn reopen(&mut self) -> Result<(), BusError> {
         self.bus = (self.opener)()?;
         self.kept.clear();
-        self.newest = None;
+        (self.newest, self.opened) = (None, self.bus.now());
         Ok(())
     }
 
@@ -227,7 +234,10 @@ impl Network {
         let pause_until = begin + WITHOUT_PAUSE;
         loop {
             let now = self.now();
-            let left = self.others.quiet(node, now).map_or(0, |quiet| PAUSE.0.saturating_sub(quiet.0));
+            // Before the first request, the bus is listened to: a transfer may run already.
+            let silence =
+                self.others.quiet(node, now).unwrap_or(Duration(now.0.saturating_sub(self.opened.0)));
+            let left = PAUSE.0.saturating_sub(silence.0);
             let is_busy = self.others.is_busy(node, now);
             // Without an answer, the frames may be the segments of a block whose begin was not heard.
             let has_waited =
@@ -341,6 +351,7 @@ impl Network {
             let step = service.next(self.now());
             progress(service);
             match step {
+                Step::Send(frame) if self.would_end_another(&frame) => {}
                 Step::Send(frame) => self.send(&frame)?,
                 Step::Wait(until) => {
                     if let Some(received) = self.fetch(until)? {
@@ -350,6 +361,11 @@ impl Network {
                 Step::Done(output) => return Ok(output),
             }
         }
+    }
+
+    /// Whether a frame is an abort message that would end the transfer of another client: it has begun in the same moment.
+    fn would_end_another(&self, frame: &Frame) -> bool {
+        frame.data().first() == Some(&ABORT) && self.others.has_transfer(frame.id(), self.now())
     }
 
     /// Passes the frames that have arrived to the service.
@@ -382,6 +398,27 @@ impl Network {
         let until = self.now() + time;
         self.wait(until, |_| None::<()>)?;
         self.steadiness.on_pause(until, self.now());
+        Ok(())
+    }
+
+    /// Lets time pass until the SDO server of a node has sent nothing for the time `quiet`, for `limit` at most. The frames that
+    /// arrive are kept.
+    ///
+    /// # Errors
+    /// The bus is lost.
+    pub(crate) fn wait_for_silence(
+        &mut self,
+        node: NodeId,
+        quiet: Duration,
+        limit: Duration,
+    ) -> Result<(), BusError> {
+        let (response, end) = (self.channel(node).response, self.now() + limit);
+        while self.now() < end {
+            let until = self.now() + quiet;
+            if self.wait(until, |frame| (frame.id() == response).then_some(()))?.is_none() {
+                break;
+            }
+        }
         Ok(())
     }
 

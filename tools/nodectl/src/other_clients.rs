@@ -109,6 +109,19 @@ impl OtherClients {
             || (now < self.retuning.until && !self.retuning.heard.contains(&node))
     }
 
+    /// Whether a transfer of another client runs on the channel with this CAN-ID of the requests.
+    pub(crate) fn has_transfer(&self, request: u16, now: Instant) -> bool {
+        let additional = self.channels.iter().find(|(_, channel)| channel.request == request);
+        let default = || match request {
+            0x601..=0x67F => u8::try_from(request & 0x7F).ok().and_then(NodeId::new),
+            _ => None,
+        };
+        match additional {
+            Some((node, _)) => self.additional.is_busy(*node, now),
+            None => default().is_some_and(|node| self.default.is_busy(node, now)),
+        }
+    }
+
     /// The time since the newest frame of another client's transfer on that channel; `None` where there was none.
     pub(crate) fn quiet(&self, node: NodeId, now: Instant) -> Option<Duration> {
         Some(Duration(now.0.saturating_sub(self.heard(node)?.frame.0)))

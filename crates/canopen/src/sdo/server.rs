@@ -164,14 +164,17 @@ impl<O: Objects> Server<O> {
         is_taken
     }
 
-    /// Takes a segment of an interrupted block. [`answer`](Server::answer) takes a frame that does not continue the block:
+    /// Takes a segment of an interrupted block, or the first one of another block: the client may have the last acknowledge, but
+    /// not yet the abort message of the time-out. [`answer`](Server::answer) takes a frame that does not continue the block:
     /// it is a request. It also takes the end of the block, after which the client listens, unless the client has its
     /// answer: the abort message of a time-out.
     #[inline(never)]
     fn take_rest(&mut self, frame: &[u8; 8], now: Tick) -> bool {
         let Transfer::Interrupted { last, most } = self.transfer else { return false };
         let rest = BlockSegment::parse(*frame).filter(|segment| {
-            (1..=most).contains(&segment.sequence.get().wrapping_sub(last)) && now < self.active
+            let sequence = segment.sequence.get();
+            let is_first = most == LOST_AFTER_TIME_OUT && sequence <= most;
+            (is_first || (1..=most).contains(&sequence.wrapping_sub(last))) && now < self.active
         });
         let is_end = rest.is_some_and(|segment| segment.last || segment.sequence == BlockSize::MAX);
         match rest {

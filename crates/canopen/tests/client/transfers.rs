@@ -235,6 +235,75 @@ fn the_answer_to_a_block_has_the_time_of_its_segments_too() {
     assert!(sends(download.next(Instant(latest))), "the end of the transfer");
 }
 
+/// A block download of two blocks whose first one has been sent.
+fn first_block_sent(data: &[u8]) -> BlockDownload<'_> {
+    let mut download = BlockDownload::new(NODE, OBJECT, data, once());
+    assert!(matches!(download.next(Instant(0)), Step::Send(_)));
+    tell(&mut download, Response::BlockDownload(OBJECT, BlockSize::MAX), 0);
+    assert_eq!(segments(&mut download, 0).len(), 127);
+    download
+}
+
+fn tell(download: &mut BlockDownload<'_>, answer: Response, ms: u64) {
+    let frame = Frame::new(0x580 + u16::from(NODE.get()), &answer.encode()).unwrap();
+    download.on_frame(&frame, Instant(ms * 1000));
+}
+
+/// The sequence numbers of the segments that the client sends now.
+fn segments(download: &mut BlockDownload<'_>, ms: u64) -> Vec<u8> {
+    let next = || match download.next(Instant(ms * 1000)) {
+        Step::Send(frame) => Some(frame.data()[0]),
+        _ => None,
+    };
+    std::iter::from_fn(next).collect()
+}
+
+/// A server that hears no segment for 300 ms acknowledges a part of the block. The other segments may still wait in the adapter:
+/// the server discards them, and acknowledges none.
+#[test]
+fn a_block_behind_the_rest_of_the_block_before_is_sent_once() {
+    let data = value(2 * 889);
+    let mut download = first_block_sent(&data);
+    tell(&mut download, Response::BlockAcknowledge(5, BlockSize::MAX), 301);
+    assert_eq!((segments(&mut download, 301).len(), download.transferred()), (127, 35));
+    for ms in [700, 1100, 5200] {
+        tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), ms);
+        assert_eq!(segments(&mut download, ms), [], "the block still waits");
+    }
+    tell(&mut download, Response::BlockAcknowledge(127, BlockSize::MAX), 9900);
+    assert_eq!((segments(&mut download, 9900).len(), download.transferred()), (122, 35 + 889));
+    tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), 9950);
+    assert_eq!(segments(&mut download, 9950).len(), 122, "nothing is left of the block before");
+}
+
+/// An acknowledge soon after the begin of the block is the one of its last segment.
+#[test]
+fn a_block_of_which_no_segment_has_arrived_is_sent_again() {
+    let data = value(2 * 889);
+    let mut download = first_block_sent(&data);
+    tell(&mut download, Response::BlockAcknowledge(5, BlockSize::MAX), 100);
+    assert_eq!(segments(&mut download, 100).len(), 127);
+    tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), 150);
+    assert_eq!((segments(&mut download, 150).len(), download.transferred()), (127, 35));
+}
+
+/// The adapter takes the segments of a block so slowly that the server acknowledges a part of it.
+#[test]
+fn an_acknowledge_before_the_last_segment_of_a_block_counts() {
+    let data = value(2 * 889);
+    let mut download = BlockDownload::new(NODE, OBJECT, &data, once());
+    assert!(matches!(download.next(Instant(0)), Step::Send(_)));
+    tell(&mut download, Response::BlockDownload(OBJECT, BlockSize::MAX), 0);
+    for _ in 0..20 {
+        assert!(matches!(download.next(Instant(0)), Step::Send(_)));
+    }
+    tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), 300);
+    tell(&mut download, Response::BlockAcknowledge(21, BlockSize::MAX), 300);
+    assert_eq!(download.transferred(), 0);
+    tell(&mut download, Response::BlockAcknowledge(20, BlockSize::MAX), 301);
+    assert_eq!((segments(&mut download, 301).len(), download.transferred()), (127, 140));
+}
+
 #[test]
 fn a_value_longer_than_its_place_is_refused() {
     for is_sizeless in [false, true] {

@@ -340,6 +340,28 @@ fn the_rest_of_a_block_after_a_time_out_is_no_request() {
     }
 }
 
+/// The client has the acknowledge of a part of a block, but not yet the abort message. Its adapter has lost the rest of that block,
+/// and one frame more.
+#[test]
+fn another_block_after_a_time_out_is_no_request() {
+    for accepted in 1..127_u8 {
+        for lost in [0, 1] {
+            let mut client = Client::new();
+            client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+            for sequence in 1..=accepted {
+                client.send_segment(middle(LIKE_REQUESTS, sequence));
+            }
+            client.bench.run(Duration::from_millis(1500));
+            client.bench.take();
+            for sequence in 1 + lost..=127 {
+                let answer = client.send_segment(middle(LIKE_REQUESTS, sequence));
+                assert_eq!(answer, None, "{sequence} after {accepted}");
+            }
+            assert_eq!(client.bench.read(0x6100, 0), Ok(vec![0, 0]), "after {accepted}");
+        }
+    }
+}
+
 /// A client that begins again, at once or later. A request that looks like the next segment is lost once.
 #[test]
 fn a_request_after_a_time_out_within_a_block_is_answered() {

@@ -63,6 +63,13 @@ fn a_request_after_a_pause_is_no_segment() {
     assert_eq!(text(&judged(&trace)), "");
 }
 
+#[test]
+fn a_block_that_begins_before_the_acknowledge_of_the_rest_counts() {
+    let mut trace = Trace::clean();
+    trace.at(1_510_000).blocks_that_cross();
+    assert_eq!(text(&judged(&trace)), "");
+}
+
 /// An EMCY has a higher priority than the answer to the request that ends its inhibit time.
 #[test]
 fn a_node_acts_by_a_new_value_before_its_answer() {

@@ -166,6 +166,21 @@ impl Trace {
         self.read(0x6003, 0, &0_u32.to_le_bytes());
     }
 
+    /// A block download of ten bytes whose client pauses within the block. The rest of the block follows the acknowledge, and the
+    /// next block begins before the server has acknowledged nothing of that rest.
+    pub(crate) fn blocks_that_cross(&mut self) {
+        let [low, high] = CRC.to_le_bytes();
+        self.ask(&[0xC6, 0x00, 0x2F, 0, 10, 0, 0, 0], &[0xA4, 0x00, 0x2F, 0, 127, 0, 0, 0]);
+        self.ask(&[0x01, 1, 2, 3, 4, 5, 6, 7], &[]);
+        self.now += 300_000;
+        self.answer(&[0xA2, 1, 127, 0, 0, 0, 0, 0]);
+        self.ask(&[0x82, 8, 9, 10, 0, 0, 0, 0], &[]);
+        self.ask(&[0x81, 8, 9, 10, 0, 0, 0, 0], &[]);
+        self.answer(&[0xA2, 0, 127, 0, 0, 0, 0, 0]);
+        self.answer(&[0xA2, 1, 127, 0, 0, 0, 0, 0]);
+        self.ask(&[0xC1 | 4 << 2, low, high, 0, 0, 0, 0, 0], &[0xA1, 0, 0, 0, 0, 0, 0, 0]);
+    }
+
     /// SYNC every 20 ms, and two events of TPDO 2.
     fn operational(&mut self) {
         self.client(310_000, 0x000, &[1, 0]);

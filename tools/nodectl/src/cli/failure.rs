@@ -24,7 +24,7 @@ Exit codes:
   3  no answer in time, or one against the protocol
   4  the bus cannot be opened, or is lost
   5  the node did not accept the new program, or has another than it was given
-  6  the program is not for this node; nothing was changed
+  6  the program is not for this node, or that of the node is on trial; no program was erased
   7  a file cannot be read or written
   8  two configurations differ (diff)
   9  the device does not conform (check)
@@ -186,7 +186,7 @@ fn sdo_code(error: &sdo::Error) -> u8 {
 /// The exit code for a node that was not updated.
 pub(super) fn update_code(error: &update::Error) -> u8 {
     match error {
-        update::Error::Sdo(error) => sdo_code(error),
+        update::Error::Sdo(error) | update::Error::Mixed(error) => sdo_code(error),
         update::Error::Closed { .. } => 1,
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Left { .. } | update::Error::Lost { .. } => 3,
@@ -194,6 +194,7 @@ pub(super) fn update_code(error: &update::Error) -> u8 {
         update::Error::Board { .. }
         | update::Error::Older { .. }
         | update::Error::OnTrial { .. }
+        | update::Error::OtherDownload { .. }
         | update::Error::NoTrial { .. } => 6,
     }
 }

@@ -262,7 +262,7 @@ impl Session {
     /// The error of an update, with a hint where it is that of a transfer.
     pub(super) fn explained_update(&self, error: update::Error) -> update::Error {
         match error {
-            update::Error::Sdo(error) => self.explained(error).into(),
+            update::Error::Sdo(error) | update::Error::Mixed(error) => self.explained(error).into(),
             other => other,
         }
     }

@@ -6,6 +6,7 @@ use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
 
 use super::channel::Via;
+use super::command::Command;
 use super::memory::Memory;
 use super::{Cause, Error, Options};
 use crate::network::Network;
@@ -48,8 +49,13 @@ impl<'n> Client<'n> {
     }
 
     fn upload_once(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        let mut upload = Upload::new(self.node, at, Memory::default(), self.options());
-        self.run(at, &mut upload, |_| ())?;
+        let node = self.node;
+        let upload = self.run(
+            at,
+            self.options(),
+            |options| Upload::new(node, at, Memory::default(), options),
+            |_| (),
+        )?;
         Ok(upload.into_sink().0)
     }
 
@@ -65,8 +71,20 @@ impl<'n> Client<'n> {
         progress: impl FnMut(usize),
     ) -> Result<(), Error> {
         let mut progress = news(progress);
-        let mut download = Download::new(self.node, at, value, self.patience(value));
-        self.run(at, &mut download, |download| progress(download.transferred()))
+        let node = self.node;
+        let begin = |options| Download::new(node, at, value, options);
+        self.run(at, self.patience(value), begin, |download| progress(download.transferred())).map(drop)
+    }
+
+    /// Writes one byte that the server need not acknowledge, because it restarts its node. The request is sent once, and a
+    /// missing answer is no error.
+    ///
+    /// # Errors
+    /// The node refuses, the bus is lost, or another client uses the server all the time.
+    pub fn command(&mut self, at: Multiplexer, value: u8) -> Result<(), Error> {
+        let node = self.node;
+        let begin = |options: Options| Command::new(node, at, value, options.timeout);
+        self.run(at, self.options(), begin, |_| ()).map(drop)
     }
 
     /// Reads an object in blocks.
@@ -74,8 +92,9 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn block_upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        let mut upload = BlockUpload::new(self.node, at, Memory::default(), self.options());
-        self.run(at, &mut upload, |_| ())?;
+        let node = self.node;
+        let begin = |options| BlockUpload::new(node, at, Memory::default(), options);
+        let upload = self.run(at, self.options(), begin, |_| ())?;
         Ok(upload.into_sink().0)
     }
 
@@ -95,8 +114,9 @@ impl<'n> Client<'n> {
             return self.download(at, value, progress);
         }
         let mut progress = news(progress);
-        let mut download = BlockDownload::new(self.node, at, value, self.patience(value));
-        self.run(at, &mut download, |download| progress(download.transferred()))
+        let node = self.node;
+        let begin = |options| BlockDownload::new(node, at, value, options);
+        self.run(at, self.patience(value), begin, |download| progress(download.transferred())).map(drop)
     }
 
     /// Extends the time limit for a long value, by the time of one frame and its answer per segment on the slowest bus.
@@ -112,33 +132,63 @@ impl<'n> Client<'n> {
         Options { limit: Duration(self.options.limit.0.min(left)), ..self.options }
     }
 
-    fn run<S>(&mut self, at: Multiplexer, service: &mut S, progress: impl FnMut(&S)) -> Result<(), Error>
+    /// Runs a transfer, and begins it again as often as the options allow. Each attempt waits for its turn.
+    fn run<S>(
+        &mut self,
+        at: Multiplexer,
+        options: Options,
+        mut begin: impl FnMut(Options) -> S,
+        mut progress: impl FnMut(&S),
+    ) -> Result<S, Error>
     where
         S: Service<Output = Result<(), sdo::Error>>,
     {
-        let result = self.in_turn(service, progress);
-        result.map_err(|cause| Error { node: self.node, at, name: None, hint: None, cause })
+        let end = self.network.own_time() + options.limit;
+        let mut retries = options.retries;
+        let cause = loop {
+            let left = Duration(end.0.saturating_sub(self.network.own_time().0));
+            let mut service = begin(Options { retries: 0, limit: left, ..options });
+            match self.in_turn(left, &mut service, &mut progress) {
+                Ok(()) => return Ok(service),
+                Err(cause) if retries > 0 && is_worth_a_retry(&cause) => retries -= 1,
+                Err(cause) => break cause,
+            }
+        };
+        if matches!(cause, Cause::Transfer(sdo::Error::NoAnswer)) {
+            // The additional server may have been switched off; the default one is always there.
+            self.network.set_channel(self.node, None);
+        }
+        Err(Error { node: self.node, at, name: None, hint: None, cause })
     }
 
     /// Runs a transfer when no transfer of another client runs.
-    fn in_turn<S>(&mut self, service: &mut S, mut progress: impl FnMut(&S)) -> Result<(), Cause>
+    fn in_turn<S>(
+        &mut self,
+        limit: Duration,
+        service: &mut S,
+        mut progress: impl FnMut(&S),
+    ) -> Result<(), Cause>
     where
         S: Service<Output = Result<(), sdo::Error>>,
     {
         let node = self.node;
         self.network.pass()?;
-        let deadline = self.network.now() + self.options().limit;
+        let deadline = self.network.now() + limit;
         if !self.network.wait_for_turn(node, deadline)? {
             return Err(Cause::Busy);
         }
         let channel = self.network.channel(node);
         let mut via = Via { service, node, channel };
-        let result = self.network.run_with(&mut via, |via| progress(via.service))?;
-        if result == Err(sdo::Error::NoAnswer) {
-            // The additional server may have been switched off; the default one is always there.
-            self.network.set_channel(node, None);
-        }
-        Ok(result?)
+        Ok(self.network.run_with(&mut via, |via| progress(via.service))??)
+    }
+}
+
+/// Whether another attempt may succeed: a frame was lost, or came twice.
+fn is_worth_a_retry(cause: &Cause) -> bool {
+    match cause {
+        Cause::Transfer(sdo::Error::NoAnswer | sdo::Error::Unexpected) => true,
+        Cause::Transfer(sdo::Error::Abort(code)) => code.is_time_out(),
+        _ => false,
     }
 }
 

@@ -63,6 +63,18 @@ impl Error {
         matches!(self.cause, Cause::Transfer(sdo::Error::NoAnswer) | Cause::Bus(BusError::Lost(_)))
     }
 
+    /// Whether a later try may succeed: the node or the bus was silent, or another client was in the way.
+    #[must_use]
+    pub fn may_pass(&self) -> bool {
+        self.is_silence() || self.is_disturbed() || matches!(self.cause, Cause::Busy)
+    }
+
+    /// Whether the bus is lost.
+    #[must_use]
+    pub fn is_bus_lost(&self) -> bool {
+        matches!(self.cause, Cause::Bus(BusError::Lost(_)))
+    }
+
     /// Whether the answer fits another transfer, as when the frames of an earlier one are still on their way.
     #[must_use]
     pub fn is_disturbed(&self) -> bool {

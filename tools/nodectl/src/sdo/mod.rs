@@ -2,6 +2,7 @@
 
 mod channel;
 mod client;
+mod command;
 mod error;
 mod memory;
 

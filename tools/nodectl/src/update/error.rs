@@ -13,6 +13,10 @@ pub enum Error {
     /// A transfer failed.
     #[error(transparent)]
     Sdo(#[from] sdo::Error),
+    /// The download has failed after a part of it had arrived, and the node has nothing against the program: frames of two
+    /// transfers were mixed up.
+    #[error(transparent)]
+    Mixed(sdo::Error),
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -69,6 +73,15 @@ pub enum Error {
         /// The node.
         node: NodeId,
     },
+    /// The loader had a complete program of another download, which has been started and is on trial now.
+    #[error(
+        "node {}: its bootloader had a complete program of another download, which runs now; its program is on trial; confirm it or roll it back first (nodectl confirm, nodectl rollback)",
+        .node.get()
+    )]
+    OtherDownload {
+        /// The node.
+        node: NodeId,
+    },
     /// The program of the node is on no trial, so there is nothing to confirm or to roll back.
     #[error("node {}: its program is not on trial", .node.get())]
     NoTrial {
@@ -107,6 +120,23 @@ impl Error {
             Error::Left { .. } => true,
             // A node that has not heard this program for a while is lost, too.
             Error::Sdo(error) => error.is_silence() || error.abort().is_some_and(AbortCode::is_time_out),
+            _ => self.is_bus_lost(),
+        }
+    }
+
+    /// Whether frames of another client, or late ones, were in the way, so that another try may succeed.
+    pub(super) fn is_disturbance(&self) -> bool {
+        match self {
+            Error::Mixed(_) => true,
+            Error::Sdo(error) => error.may_pass() && !self.can_continue(),
+            _ => false,
+        }
+    }
+
+    /// Whether the bus is lost.
+    pub(super) fn is_bus_lost(&self) -> bool {
+        match self {
+            Error::Sdo(error) => error.is_bus_lost(),
             Error::Bus(error) => matches!(error, BusError::Lost(_)),
             _ => false,
         }

@@ -1,27 +1,32 @@
 //! The update of one node. The job keeps its state while the node is lost, so that the update can continue afterwards.
 
-use canopen::sdo::Multiplexer;
-use canopen::{Duration, NodeId};
+use canopen::sdo::{Abort, Multiplexer};
+use canopen::{Duration, Instant, NodeId};
 
-use super::image::version;
 use ::update::Refusal;
 
+use super::image::version;
+use super::waiting::{POLL, Patience, RESTART, pauses, wait_for_return, wait_until_running};
 use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher, trial};
-use crate::bus::BusError;
 use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::{Network, value};
 
-/// How long a node may take to restart.
-const RESTART: Duration = Duration::from_millis(15_000);
-/// The time between two requests to a busy node.
-pub(super) const POLL: Duration = Duration::from_millis(100);
+/// How long a program may still run after the command to stop it. A node that has lost its power in the meantime runs its
+/// program again.
+const STOP: Duration = Duration::from_millis(5_000);
+/// How often a node is told to stop its program.
+const STOPS: usize = 3;
+/// How long the rest of a broken download may take to arrive.
+const REST: Duration = Duration::from_millis(4_000);
 /// How long a node may take to erase the flash, or to check the program.
 const FLASH: Duration = Duration::from_millis(60_000);
 /// The number of tries to clear the flash when the node refuses although its flash is not busy.
 const CLEARS: usize = 5;
 /// How often a run continues after the node was lost.
 const RESUMES: usize = 10;
+/// How often a run continues after another client was in the way.
+const DISTURBANCES: usize = 5;
 
 /// The options of an update.
 #[derive(Clone, Copy, Debug)]
@@ -87,33 +92,58 @@ pub(super) struct Job<'a> {
     options: &'a Options,
     before: Option<State>,
     progress: Progress,
+    /// How often the node may still be told to stop its program.
+    stops: usize,
+    /// Whether a download in blocks has failed.
+    has_failed: bool,
 }
 
 impl<'a> Job<'a> {
     pub(super) fn new(node: NodeId, image: &'a Image, options: &'a Options) -> Job<'a> {
-        Job { node, image, options, before: None, progress: Progress::Untouched }
+        Job {
+            node,
+            image,
+            options,
+            before: None,
+            progress: Progress::Untouched,
+            stops: STOPS,
+            has_failed: false,
+        }
     }
 
-    /// Runs the update, and continues after each loss of the node that is not longer than `patience`.
+    /// Runs the update, and continues after each loss of the node or of the bus that is not longer than `patience`.
     pub(super) fn run(
         &mut self,
         network: &mut Network,
-        patience: Duration,
+        patience: Patience,
         watcher: &mut dyn Watcher,
     ) -> Result<Outcome, Error> {
-        let mut resumes = RESUMES;
-        loop {
+        let (mut resumes, mut disturbances) = (RESUMES, DISTURBANCES);
+        for pause in pauses().take(RESUMES + DISTURBANCES) {
             match self.attempt(network, watcher) {
                 // A node that has never answered does not count as lost.
-                Err(error) if error.can_continue() && self.before.is_some() && resumes > 0 => {
+                Err(error) if error.can_continue() && self.is_lost(&error) && resumes > 0 => {
                     resumes -= 1;
                     watcher.step(self.node, Step::Lost);
-                    self.wait_for_return(network, patience)?;
+                    wait_for_return(network, self.node, self.options.sdo, patience)?;
                     watcher.step(self.node, Step::Back);
+                }
+                Err(error) if error.is_disturbance() && disturbances > 0 => {
+                    disturbances -= 1;
+                    watcher.step(self.node, Step::Disturbed);
+                    wait_for_return(network, self.node, self.options.sdo, patience)?;
                 }
                 result => return result,
             }
+            // A bus that is lost in the pause is noticed afterwards.
+            let _ = network.pause(pause);
         }
+        self.attempt(network, watcher)
+    }
+
+    /// Whether an error means that something was there before.
+    fn is_lost(&self, error: &Error) -> bool {
+        self.before.is_some() || error.is_bus_lost()
     }
 
     /// Brings the node from any state to the new program.
@@ -133,7 +163,7 @@ impl<'a> Job<'a> {
             self.open(network)?;
             watcher.step(self.node, Step::Start);
             self.program(network).restart(Command::Start)?;
-            self.wait_until_running(network, true, "start the new program")?;
+            self.wait_until_running(network, true, RESTART, "start the new program")?;
         }
         let after = self.state(network)?;
         let is_on_trial = self.end_trial(network, &after, watcher)?;
@@ -176,7 +206,7 @@ impl<'a> Job<'a> {
     fn is_another(&self, network: &mut Network, expected: u32, found: u32) -> Result<Error, Error> {
         let node = self.node;
         if self.progress == Progress::Found {
-            return Ok(Error::OnTrial { node });
+            return Ok(Error::OtherDownload { node });
         }
         Ok(match self.program(network).status()? {
             Some(status) if !is_good(status) => Error::Flash { node, status },
@@ -212,17 +242,20 @@ impl<'a> Job<'a> {
         if is_running && self.image.info.is_some() && self.program(network).is_on_trial()? {
             return Err(Error::OnTrial { node: self.node });
         }
+        // A node that is open now is closed when the new program runs, and the key is needed to confirm it.
+        if self.image.info.is_some() && self.options.key.is_none() && self.program(network).is_guarded()? {
+            return Err(Error::Closed { node: self.node });
+        }
         self.open(network)?;
         if is_running {
             watcher.step(self.node, Step::Stop);
-            self.program(network).restart(Command::Stop)?;
-            self.wait_until_running(network, false, "stop its program")?;
+            self.stop(network)?;
         }
         let cleared = self.clear(network, watcher);
         self.progress = match (cleared, self.progress) {
             // The download was complete when the node was lost, so the program on trial is the new one.
             (Err(Error::OnTrial { .. }), Progress::Cleared) => Progress::Complete,
-            (Err(Error::OnTrial { .. }), _) if !is_running && self.image.info.is_some() => Progress::Found,
+            (Err(Error::OnTrial { .. }), _) if self.image.info.is_some() => Progress::Found,
             (cleared, _) => {
                 cleared?;
                 self.progress = Progress::Cleared;
@@ -233,8 +266,18 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
+    /// Stops the program. The command is in the RAM of the node: after a loss of power, the program runs again.
+    fn stop(&mut self, network: &mut Network) -> Result<(), Error> {
+        self.program(network).restart(Command::Stop)?;
+        self.stops = self.stops.saturating_sub(1);
+        match self.wait_until_running(network, false, STOP, "stop its program") {
+            Err(Error::Stuck { node, .. }) if self.stops > 0 => Err(Error::Left { node }),
+            result => result,
+        }
+    }
+
     /// Downloads the new program into the cleared flash, and waits until the node has checked it.
-    fn fill(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+    fn fill(&mut self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
         self.download(network, watcher)?;
         watcher.step(self.node, Step::Verify);
         self.wait_for_flash(network, is_good)?;
@@ -286,36 +329,47 @@ impl<'a> Job<'a> {
     }
 
     /// Downloads the program in blocks; in segments where the node does not support blocks.
-    fn download(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
-        let (node, total) = (self.node, self.image.bytes.len());
+    fn download(&mut self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+        let (node, total, begin) = (self.node, self.image.bytes.len(), network.now());
         watcher.step(node, Step::Download);
         let mut arrived = 0;
         let blocks = self.program(network).download_blocks(&self.image.bytes, |done| {
             arrived = done;
             watcher.progress(node, done, total);
         });
-        match blocks {
-            Err(error) if error.abort().is_some_and(sdo::AbortCode::is_protocol) => (),
-            result => return result.map_err(|error| self.reason(network, error)),
+        let Err(error) = blocks else { return Ok(()) };
+        let is_protocol = error.abort().is_some_and(sdo::AbortCode::is_protocol);
+        let is_disturbed = network.has_other_request_since(node, begin);
+        let is_first = !std::mem::replace(&mut self.has_failed, true);
+        if !is_protocol || is_disturbed || arrived > 0 && is_first {
+            return Err(self.reason(network, error, begin, arrived));
         }
         if arrived > 0 {
             self.clear(network, watcher)?;
         }
         watcher.step(node, Step::DownloadSegments);
-        let progress = |done| watcher.progress(node, done, total);
-        let segments = self.program(network).download_segments(&self.image.bytes, progress);
-        segments.map_err(|error| self.reason(network, error))
+        let segments = self.program(network).download_segments(&self.image.bytes, |done| {
+            arrived = done;
+            watcher.progress(node, done, total);
+        });
+        segments.map_err(|error| self.reason(network, error, begin, arrived))
     }
 
-    /// Why the node has aborted the download, from its status: the abort code has no details.
-    fn reason(&self, network: &mut Network, error: sdo::Error) -> Error {
+    /// Why the download has failed. The status of the node has the details, which the abort code has not. Without a reason in
+    /// the status, the frames of the download may have been mixed up with those of another client.
+    fn reason(&self, network: &mut Network, error: sdo::Error, begin: Instant, arrived: usize) -> Error {
         // The node also answers the segments that were on their way.
-        let _ = network.pause(POLL);
+        let _ = network.wait_for_silence(self.node, POLL, REST);
         let is_refused = |status: &Status| !status.busy && status.code != 0;
-        let is_told = error.abort().is_some_and(|code| !code.is_time_out());
-        let status = if is_told { self.program(network).status().ok().flatten() } else { None };
+        let code = error.abort().filter(|code| !code.is_time_out());
+        let status = code.and_then(|_| self.program(network).status().ok().flatten());
         match status.filter(is_refused) {
             Some(status) => Error::Flash { node: self.node, status },
+            // The node may have taken a segment for any request.
+            None if code.is_some() && network.has_other_request_since(self.node, begin) => {
+                Error::Mixed(error)
+            }
+            None if arrived > 0 && code.is_some_and(is_of_a_mixture) => Error::Mixed(error),
             None => error.into(),
         }
     }
@@ -333,31 +387,16 @@ impl<'a> Job<'a> {
         Err(Error::Stuck { node: self.node, what: "get done with its flash" })
     }
 
-    /// Waits until the node is back from a restart, with or without a running program as `wanted`.
+    /// Waits until the node is back from a restart, with or without a running program as `wanted`. A node that answers may
+    /// take until `limit`.
     fn wait_until_running(
         &self,
         network: &mut Network,
         wanted: bool,
+        limit: Duration,
         what: &'static str,
     ) -> Result<(), Error> {
-        wait_until_running(network, self.node, self.options.sdo, wanted, what)
-    }
-
-    /// Waits for a lost node. Opens the bus again if the bus is lost, too.
-    fn wait_for_return(&self, network: &mut Network, patience: Duration) -> Result<(), Error> {
-        let until = network.now() + patience;
-        loop {
-            match self.program(network).is_running() {
-                Ok(_) => return Ok(()),
-                Err(sdo::Error { cause: sdo::Cause::Bus(BusError::Lost(_)), .. }) => reopen(network),
-                // After bus-off, node and adapter send the frames of the broken transfer that they have kept.
-                Err(error) if error.is_silence() || error.is_disturbed() => network.pause(POLL)?,
-                Err(error) => return Err(error.into()),
-            }
-            if network.now() >= until {
-                return Err(Error::Lost { node: self.node, patience: patience.0 / 1_000_000 });
-            }
-        }
+        wait_until_running(network, self.node, self.options.sdo, (wanted, limit), what)
     }
 
     /// The state of a node whose loader is not busy. One that lost its power in a copy finishes the copy first, and has
@@ -420,30 +459,9 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Waits until a node is back from a restart, with or without a running program as `wanted`.
-pub(super) fn wait_until_running(
-    network: &mut Network,
-    node: NodeId,
-    options: sdo::Options,
-    wanted: bool,
-    what: &'static str,
-) -> Result<(), Error> {
-    let until = network.now() + RESTART;
-    while network.now() < until {
-        match Program::new(network, node, options).is_running() {
-            Ok(is_running) if is_running == wanted => return Ok(()),
-            Err(error) if !error.is_silence() => return Err(error.into()),
-            _ => network.pause(POLL)?,
-        }
-    }
-    Err(Error::Stuck { node, what })
-}
-
-/// Tries to open the bus. After a failure it pauses, because the bus may come back; the caller limits the whole time.
-fn reopen(network: &mut Network) {
-    if network.reopen().is_err() {
-        std::thread::sleep(std::time::Duration::from_micros(POLL.0));
-    }
+/// Whether a server aborts with this code when it takes frames of another transfer for segments, or segments twice.
+fn is_of_a_mixture(code: sdo::AbortCode) -> bool {
+    code.is_protocol() || code == Abort::TooLong.into() || code == Abort::TooShort.into()
 }
 
 /// Whether a status means a valid program that can be started.

@@ -11,6 +11,7 @@ mod image;
 mod job;
 mod program;
 mod trial;
+mod waiting;
 mod watcher;
 
 pub use ::update::{Event, Log, Status, Version};

@@ -2,13 +2,12 @@
 //! have 2002h, the trial of a new program, and 2003h, the authorisation of a change.
 
 use canopen::NodeId;
-use canopen::client::sdo;
 use canopen::sdo::Multiplexer;
 
 use super::{AuthorisationKey, Status};
 use crate::Network;
 use crate::object::at;
-use crate::sdo::{Cause, Client, Error, Options};
+use crate::sdo::{Client, Error, Options};
 
 const DATA: Multiplexer = at(0x1F50, 1);
 const CONTROL: Multiplexer = at(0x1F51, 1);
@@ -116,10 +115,22 @@ impl<'n> Program<'n> {
     /// # Errors
     /// SDO errors.
     pub fn is_closed(&mut self) -> Result<bool, Error> {
+        Ok(self.authorisation()? == 1)
+    }
+
+    /// Whether the node demands an authorisation after each of its starts. Only for nodes of this project.
+    ///
+    /// # Errors
+    /// SDO errors.
+    pub fn is_guarded(&mut self) -> Result<bool, Error> {
+        Ok(self.authorisation()? != 0)
+    }
+
+    fn authorisation(&mut self) -> Result<u8, Error> {
         match self.read(AUTHORISATION_STATE) {
-            Ok(state) => Ok(state.first() == Some(&1)),
+            Ok(state) => Ok(state.first().copied().unwrap_or(0)),
             // Programs of the time before authorisations, and bootloaders without a key, have no such object.
-            Err(error) if error.is_absent() => Ok(false),
+            Err(error) if error.is_absent() => Ok(0),
             Err(error) => Err(error),
         }
     }
@@ -165,11 +176,7 @@ impl<'n> Program<'n> {
     /// # Errors
     /// The node refuses, or the bus is lost.
     pub fn restart(&mut self, command: Command) -> Result<(), Error> {
-        let once = Options { retries: 0, ..self.options };
-        match self.client(once).download(CONTROL, &[command as u8], |_| ()) {
-            Err(Error { cause: Cause::Transfer(sdo::Error::NoAnswer), .. }) => Ok(()),
-            result => result.map_err(named),
-        }
+        self.client(self.options).command(CONTROL, command as u8).map_err(named)
     }
 
     /// Downloads the program in blocks. The download is not repeated, because half a program has to be cleared first.

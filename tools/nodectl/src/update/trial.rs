@@ -4,7 +4,7 @@ use canopen::{Duration, NodeId};
 
 use ::update::{Reason, Refusal};
 
-use super::job::{POLL, wait_until_running};
+use super::waiting::{POLL, RESTART, wait_until_running};
 use super::{AuthorisationKey, Command, Error, Program, Status};
 use crate::Network;
 use crate::sdo::Options;
@@ -36,7 +36,7 @@ pub fn decide(
     if !Program::new(network, node, options).is_running()? {
         open(network, node, options, key)?;
         Program::new(network, node, options).restart(Command::Start)?;
-        wait_until_running(network, node, options, true, "start its program")?;
+        wait_until_running(network, node, options, (true, RESTART), "start its program")?;
     }
     if !Program::new(network, node, options).is_on_trial()? {
         return Err(Error::NoTrial { node });
@@ -92,7 +92,7 @@ fn roll_back(network: &mut Network, node: NodeId, options: Options) -> Result<()
             // A node whose previous program is damaged keeps the present one.
             Ok(true) if program.status()?.is_some_and(is_taken_back) => return Ok(()),
             Ok(true) => break,
-            Err(error) if !error.is_silence() => return Err(error.into()),
+            Err(error) if !error.may_pass() || error.is_bus_lost() => return Err(error.into()),
             _ => network.pause(POLL)?,
         }
     }

@@ -38,6 +38,8 @@ pub enum Step {
     Lost,
     /// The node is back.
     Back,
+    /// Frames of another client, or late ones, were in the way: the update continues in the state of the node.
+    Disturbed,
 }
 
 impl fmt::Display for Step {
@@ -54,6 +56,7 @@ impl fmt::Display for Step {
             Step::Confirm => "confirm",
             Step::Lost => "lost, waiting",
             Step::Back => "back",
+            Step::Disturbed => "disturbed, trying again",
         })
     }
 }

@@ -204,3 +204,63 @@ fn a_read_that_another_client_has_interrupted_is_tried_again() {
     assert!(line.contains("STM32F4 pressure transmitter"), "{line}");
     assert!(wire.station(|crossing| crossing.has_asked));
 }
+
+/// A node, and another client that begins a block download in the moment of the first request to the node. The node takes that
+/// request for a segment.
+struct Crossed {
+    node: Pressure,
+    /// When the block download ends.
+    end: Option<Instant>,
+    /// When the next segment comes, and its sequence number.
+    next: Instant,
+    sequence: u8,
+    /// The first bytes of the requests in the block download.
+    disturbing: Vec<u8>,
+}
+
+const BLOCKS: Duration = Duration::from_millis(4000);
+
+impl Station for Crossed {
+    fn receive(&mut self, received: &Frame, now: Instant, out: &mut impl Transmit) {
+        let is_request = received.id() == 0x601;
+        if is_request && self.end.is_none() {
+            let _ = out.send(frame(0x601, [0xC6, 0x50, 0x1F, 1, 0, 0, 1, 0]));
+            let _ = out.send(frame(0x581, [0xA4, 0x50, 0x1F, 1, 127, 0, 0, 0]));
+            (self.end, self.next) = (Some(now + BLOCKS), now);
+        }
+        if is_request && self.end > Some(now) {
+            self.disturbing.push(received.data()[0]);
+        } else {
+            self.node.receive(received, now, out);
+        }
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        if self.next <= now {
+            let _ = out.send(frame(0x601, [self.sequence, 0, 0, 0, 0, 0, 0, 0]));
+            if self.sequence == 127 {
+                let _ = out.send(frame(0x581, [0xA2, 127, 127, 0, 0, 0, 0, 0]));
+            }
+            self.sequence = self.sequence % 127 + 1;
+            self.next = now + Duration::from_millis(2);
+            if self.end <= Some(now) && self.sequence == 1 {
+                let _ = out.send(frame(0x601, [0xC1, 0, 0, 0, 0, 0, 0, 0]));
+                let _ = out.send(frame(0x581, [0xA1, 0, 0, 0, 0, 0, 0, 0]));
+                self.next = Instant::NEVER;
+            }
+        }
+        self.node.poll(now, out).min(self.next)
+    }
+}
+
+#[test]
+fn a_request_in_the_moment_of_another_clients_block_download_does_not_abort_it() {
+    let node = Pressure::new(1);
+    let crossed = Crossed { node, end: None, next: Instant::NEVER, sequence: 1, disturbing: Vec::new() };
+    let wire = Wire::new(crossed);
+    let mut network = wire.network();
+    network.pause(Duration::from_millis(5)).expect("a bus");
+    let value = client(&mut network, 1).upload(at(0x1017, 0)).expect("a value");
+    assert_eq!(value, 1000_u16.to_le_bytes());
+    assert_eq!(wire.station(|crossed| crossed.disturbing.clone()), [0x40], "once, and no abort message");
+}

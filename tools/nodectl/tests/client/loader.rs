@@ -55,6 +55,9 @@ const RESTART: Duration = Duration::from_millis(200);
 const ERASE: Duration = Duration::from_millis(1500);
 const CHECK: Duration = Duration::from_millis(100);
 
+/// The value of 1F57h of a program on trial: code 73.
+const ON_TRIAL: u32 = 73 << 1;
+
 /// The program, and the state of the loader.
 #[derive(Clone, Debug)]
 pub(crate) struct Flash {
@@ -85,12 +88,16 @@ pub(crate) struct Flash {
     copied: Option<Instant>,
     /// The loader starts its program by itself just before it receives this command.
     pub(crate) starts_before: Option<u8>,
+    /// The program that another master downloads as soon as the program is stopped. It is on trial and cannot be cleared.
+    pub(crate) other_download: Option<Vec<u8>>,
+    /// How often the node loses its power just after it has accepted the command to stop its program.
+    pub(crate) power_cuts: usize,
     now: Instant,
 }
 
 impl Flash {
     /// Makes a new challenge at a start.
-    fn challenge(&mut self, is_answered: bool) {
+    pub(crate) fn challenge(&mut self, is_answered: bool) {
         let noise = [self.now.0 as u32, self.commands.len() as u32];
         let pair = self.key.map(|key| Pair::new(&key, &noise, SERIAL_NUMBER));
         self.authorisation = Authorisation::new(pair, is_answered);
@@ -105,7 +112,13 @@ impl Flash {
         self.commands.push(command);
         self.runs |= self.starts_before.take_if(|before| *before == command).is_some();
         match (command, self.runs) {
-            (0, true) => self.next = Some(false),
+            (0, true) => {
+                self.next = Some(self.power_cuts > 0);
+                if let Some(program) = self.other_download.take() {
+                    (self.program, self.status, self.is_on_trial) = (program, ON_TRIAL, true);
+                }
+                self.power_cuts = self.power_cuts.saturating_sub(1);
+            }
             (0, false) => (),
             (1, false) if self.program.is_empty() => return Err(Abort::DeviceState),
             (1, false) => {
@@ -114,6 +127,7 @@ impl Flash {
                     (self.program, self.status) = (program, 0x0001_0090);
                 }
             }
+            (3, false) if self.status == ON_TRIAL => return Err(Abort::DeviceState),
             (3, false) => {
                 (self.program, self.status, self.erased) = (Vec::new(), 0, self.erased + 1);
                 self.busy_until = self.now + ERASE;
@@ -198,6 +212,8 @@ impl Loader {
             next: None,
             copied: None,
             starts_before: None,
+            power_cuts: 0,
+            other_download: None,
             now: Instant(0),
         };
         Loader { id, device: Device::new(&DICTIONARY, id, flash), up: Instant(0), is_started: false }

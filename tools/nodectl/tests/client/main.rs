@@ -22,9 +22,11 @@ mod rules;
 mod safety;
 mod simulate;
 #[cfg(unix)]
+mod slow_bus;
 mod targets;
 mod texts;
 mod trace;
 mod transfers;
 mod update;
+mod update_disturbed;
 mod wire;

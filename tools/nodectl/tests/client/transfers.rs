@@ -45,6 +45,8 @@ fn a_refusal_names_node_object_and_reason() {
 #[test]
 fn a_request_without_an_answer_times_out() {
     let mut network = Wire::new(Pressure::new(5)).network();
+    // The first request to a bus waits until the bus has been listened to.
+    network.pause(Duration::from_millis(30)).expect("a bus");
     let start = network.now();
     let error = client(&mut network, 6).upload(at(0x1000, 0)).unwrap_err();
     assert!(matches!(error.cause, Cause::Transfer(sdo::Error::NoAnswer)) && error.is_silence());

@@ -9,7 +9,7 @@ use crate::wire::{Fate, Wire};
 
 /// The reports of an update.
 #[derive(Default)]
-struct Diary {
+pub(crate) struct Diary {
     steps: Vec<(u8, Step)>,
     done: usize,
 }
@@ -26,7 +26,7 @@ impl Watcher for Diary {
 }
 
 impl Diary {
-    fn steps_of(&self, node: u8) -> Vec<Step> {
+    pub(crate) fn steps_of(&self, node: u8) -> Vec<Step> {
         self.steps.iter().filter(|(of, _)| *of == node).map(|(_, step)| *step).collect()
     }
 }
@@ -36,31 +36,31 @@ type Results = Vec<(NodeId, Result<Outcome, Error>)>;
 const ALL: [Step; 6] = [Step::Identify, Step::Stop, Step::Clear, Step::Download, Step::Verify, Step::Start];
 
 /// A program of this version.
-fn program(version: &str) -> Vec<u8> {
+pub(crate) fn program(version: &str) -> Vec<u8> {
     let mut program = format!("{version}\n").into_bytes();
     program.extend((0..20_000_u32).map(|byte| (byte % 253) as u8));
     program
 }
 
-fn image(version: Version) -> Image {
+pub(crate) fn image(version: Version) -> Image {
     let bytes = program(&version.to_string());
     let info = ImageInfo { board: 42, version, identification: identification(&bytes) };
     Image { bytes, info: Some(info) }
 }
 
 const OLD: Version = Version { major: 1, minor: 0, patch: 0 };
-const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
+pub(crate) const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
 
-fn options() -> Options {
+pub(crate) fn options() -> Options {
     let sdo = sdo::Options { timeout: Duration::from_millis(500), ..sdo::Options::default() };
     Options { sdo, patience: Duration::from_millis(20_000), force: false, key: None, confirm: true }
 }
 
-fn nodes(ids: &[u8]) -> Vec<NodeId> {
+pub(crate) fn nodes(ids: &[u8]) -> Vec<NodeId> {
     ids.iter().filter_map(|&id| NodeId::new(id)).collect()
 }
 
-fn fleet(ids: &[u8]) -> Wire<Vec<Loader>> {
+pub(crate) fn fleet(ids: &[u8]) -> Wire<Vec<Loader>> {
     Wire::new(ids.iter().map(|&id| Loader::new(id, &program("1.0.0"))).collect())
 }
 
@@ -69,7 +69,7 @@ fn run(wire: &Wire<Vec<Loader>>, ids: &[u8], image: &Image, options: &Options, d
 }
 
 /// Updates node 3 alone.
-fn one(
+pub(crate) fn one(
     wire: &Wire<Vec<Loader>>,
     image: &Image,
     options: &Options,
@@ -79,7 +79,7 @@ fn one(
     result
 }
 
-fn commands(wire: &Wire<Vec<Loader>>) -> Vec<u8> {
+pub(crate) fn commands(wire: &Wire<Vec<Loader>>) -> Vec<u8> {
     wire.station(|loaders| loaders[0].flash().commands.clone())
 }
 
@@ -106,7 +106,7 @@ fn the_sequence_of_cia_302() {
 /// The key of a node that demands an authorisation.
 const KEY: [u8; 32] = [0x5A; 32];
 
-fn with_key() -> Options {
+pub(crate) fn with_key() -> Options {
     Options { key: Some("5A".repeat(32).parse().unwrap()), ..options() }
 }
 
@@ -127,8 +127,13 @@ fn the_key_holder_updates_and_confirms_a_guarded_node() {
 fn without_the_key_of_a_node_nothing_is_changed() {
     let (wire, mut diary) = (fleet(&[3]), Diary::default());
     wire.station(|loaders| loaders[0].set_key(KEY));
-    let error = one(&wire, &image(NEW), &options(), &mut diary).unwrap_err();
-    assert!(matches!(error, Error::Closed { .. }), "{error}");
+    // Also where another master has opened the node: it is closed again when the new program is to be confirmed.
+    for is_open in [false, true] {
+        wire.station(|loaders| loaders[0].flash().challenge(is_open));
+        let error = one(&wire, &image(NEW), &options(), &mut diary).unwrap_err();
+        assert!(matches!(error, Error::Closed { .. }), "{is_open}: {error}");
+    }
+    wire.station(|loaders| loaders[0].flash().challenge(false));
     let other = Options { key: Some("5B".repeat(32).parse().unwrap()), ..options() };
     let error = one(&wire, &image(NEW), &other, &mut diary).unwrap_err();
     assert!(error.to_string().contains("Program authorisation: response"), "{error}");

@@ -86,6 +86,26 @@ impl<S: Station + 'static> Wire<S> {
         })
         .expect("an open bus")
     }
+
+    /// A client's connection to the bus that cannot be opened again at once: a second passes with each of so many tries.
+    pub(crate) fn network_back_after(&self, tries: usize) -> Network {
+        let (this, mut tries) = (self.clone(), tries);
+        Network::open(move || {
+            let mut state = this.0.borrow_mut();
+            if state.broken && tries > 0 {
+                tries -= 1;
+                let until = state.bus.now() + Duration::from_millis(1000);
+                while state.bus.now() < until {
+                    state.bus.receive(until)?;
+                }
+                return Err(BusError::Lost(io::Error::other("unplugged")));
+            }
+            state.broken = false;
+            drop(state);
+            Ok(Box::new(this.clone()))
+        })
+        .expect("an open bus")
+    }
 }
 
 impl<S: Station> State<S> {

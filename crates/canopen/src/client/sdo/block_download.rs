@@ -3,11 +3,15 @@
 use super::link::{Channel, Link};
 use super::transfer::{self, Progress, Transfer};
 use super::{BlockDownload, Error, Options};
-use crate::Instant;
+use crate::client::service::later;
 use crate::sdo::{BlockEnd, BlockSegment, BlockSize, Bytes, Multiplexer, Request, Response, crc};
+use crate::{Duration, Instant};
 
 /// The transfer fails after this many blocks in a row without a segment that the server acknowledged.
 const MAX_EMPTY_BLOCKS: u8 = 3;
+/// A server that hears no segment for a while may acknowledge a part of the block. Servers wait longer than this time, so an
+/// acknowledge that comes earlier is the one of the last segment.
+const SHORTEST_PAUSE: Duration = Duration::from_millis(250);
 
 /// A block download under way.
 #[derive(Debug)]
@@ -24,13 +28,21 @@ pub struct Protocol<'a> {
 enum Phase {
     /// The server has not yet announced the size of a block.
     Begin,
-    Block {
-        size: BlockSize,
-        /// Segments of this block that have been sent.
-        sent: u8,
-    },
+    Block(Block),
     /// The server has acknowledged all data, but has not yet confirmed the CRC.
     End,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    size: BlockSize,
+    /// Segments of this block that have been sent.
+    sent: u8,
+    /// The time of the answer before the block.
+    since: Instant,
+    /// The last segments of the block before may still wait in the adapter, behind more urgent frames. The server
+    /// discards them, and acknowledges none.
+    has_rest: bool,
 }
 
 impl<'a> BlockDownload<'a> {
@@ -65,7 +77,7 @@ impl Protocol<'_> {
     }
 
     /// The server has the block up to this segment. The remaining segments are sent again in the next block.
-    fn acknowledge(&mut self, sequence: u8, next: BlockSize, link: &mut Link) -> Result<Progress, Error> {
+    fn acknowledge(&mut self, sequence: u8, next: Block, link: &mut Link) -> Result<Progress, Error> {
         let is_all = 7 * usize::from(sequence) >= self.rest(0).len() && sequence > 0;
         self.done = self.done.saturating_add(7 * usize::from(sequence)).min(self.data.len());
         self.empty_blocks = if sequence == 0 { self.empty_blocks.saturating_add(1) } else { 0 };
@@ -77,9 +89,34 @@ impl Protocol<'_> {
             self.phase = Phase::End;
             link.ask(Request::BlockDownloadEnd(end));
         } else {
-            self.phase = Phase::Block { size: next, sent: 0 };
+            self.phase = Phase::Block(next);
         }
         Ok(Progress::Continues)
+    }
+
+    /// Takes the answer to a block, or to a part of it.
+    fn on_acknowledge(
+        &mut self,
+        block: Block,
+        sequence: u8,
+        size: BlockSize,
+        link: &mut Link,
+        now: Instant,
+    ) -> Result<Progress, Error> {
+        let Block { sent, since, has_rest, .. } = block;
+        let is_sent = sent == self.len(block.size);
+        if sequence > sent || (sequence == 0 && !is_sent) {
+            return Ok(Progress::Unexpected);
+        }
+        if sequence == 0 && has_rest {
+            // This block follows the rest. To repeat it now would send it twice.
+            link.expect_equal();
+            link.wait_for_block(sent, now);
+            return Ok(Progress::Continues);
+        }
+        let is_late = now >= later(since, SHORTEST_PAUSE);
+        let has_rest = sequence > 0 && sequence < sent && is_late;
+        self.acknowledge(sequence, Block { size, sent: 0, since: now, has_rest }, link)
     }
 }
 
@@ -91,12 +128,14 @@ impl transfer::Protocol for Protocol<'_> {
     }
 
     fn segment(&mut self, link: &mut Link) -> Option<BlockSegment> {
-        let Phase::Block { size, sent } = self.phase else { return None };
+        let Phase::Block(Block { size, sent, .. }) = self.phase else { return None };
         let sequence = BlockSize::new(sent.saturating_add(1)).filter(|next| next.get() <= self.len(size))?;
         let rest = self.rest(sent);
         let segment =
             BlockSegment { last: rest.len() <= 7, sequence, data: Bytes::from_slice(rest).padded() };
-        self.phase = Phase::Block { size, sent: sequence.get() };
+        if let Phase::Block(block) = &mut self.phase {
+            block.sent = sequence.get();
+        }
         if sequence.get() == self.len(size) {
             // Acknowledgements of two blocks of the same size are equal.
             link.expect_equal();
@@ -104,16 +143,14 @@ impl transfer::Protocol for Protocol<'_> {
         Some(segment)
     }
 
-    fn on_response(&mut self, data: [u8; 8], link: &mut Link, _: Instant) -> Result<Progress, Error> {
+    fn on_response(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error> {
         match (self.phase, Response::parse(data)) {
             (Phase::Begin, Some(Response::BlockDownload(of, size))) if of == link.at => {
-                self.phase = Phase::Block { size, sent: 0 };
+                self.phase = Phase::Block(Block { size, sent: 0, since: now, has_rest: false });
                 Ok(Progress::Continues)
             }
-            (Phase::Block { size, sent }, Some(Response::BlockAcknowledge(sequence, next)))
-                if sent == self.len(size) && sequence <= sent =>
-            {
-                self.acknowledge(sequence, next, link)
+            (Phase::Block(block), Some(Response::BlockAcknowledge(sequence, size))) => {
+                self.on_acknowledge(block, sequence, size, link, now)
             }
             (Phase::End, Some(Response::BlockDownloaded)) => Ok(Progress::Complete),
             _ => Ok(Progress::Unexpected),

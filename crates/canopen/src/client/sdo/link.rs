@@ -92,9 +92,14 @@ impl Link {
     /// wait still.
     pub(super) fn segment(&mut self, segment: BlockSegment, now: Instant) -> Frame {
         self.has_unexpected = false;
-        let sending = Duration(SEGMENT_TIME.0 * u64::from(segment.sequence.get()));
-        self.answer_by = later(later(now, sending), self.options.timeout);
+        self.wait_for_block(segment.sequence.get(), now);
         self.frame(segment.encode())
+    }
+
+    /// Sets the longest time until the answer to so many segments, none of which has been on the bus yet.
+    pub(super) fn wait_for_block(&mut self, segments: u8, now: Instant) {
+        let sending = Duration(SEGMENT_TIME.0 * u64::from(segments));
+        self.wait(Duration(sending.0.saturating_add(self.options.timeout.0)), now);
     }
 
     fn frame(&self, data: [u8; 8]) -> Frame {

@@ -127,7 +127,7 @@ impl<T: Fn(Json)> Teller<T> {
             Step::Verify => "verify",
             Step::Start => "start",
             Step::Confirm => "confirm",
-            Step::Lost => "lost",
+            Step::Lost | Step::Disturbed => "lost",
             Step::Back => "back",
         };
         let text = self.step.to_string();
