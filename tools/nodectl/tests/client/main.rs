@@ -21,8 +21,8 @@ mod process;
 mod rules;
 mod safety;
 mod simulate;
-#[cfg(unix)]
 mod slow_bus;
+#[cfg(unix)]
 mod targets;
 mod texts;
 mod trace;
