@@ -97,7 +97,7 @@ impl Case {
         (0..2 * OLDER).for_each(|_| sample(bench));
         let value = bench.read(self.value.0, self.value.1).unwrap();
         if matches!(self.command.0 & 0xF7FF, 0x6125 | 0x6139) {
-            // Exactly 0 but for the last digit of a REAL32 of some 300,000.
+            // The last digit of a REAL32 of 300,000.
             f32::from_le_bytes(value.try_into().unwrap()).abs() < 0.1
         } else {
             value[..self.expected.len()] == self.expected

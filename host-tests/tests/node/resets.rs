@@ -1,4 +1,4 @@
-//! What resets restore. A reset of the communication leaves the objects from 2000h on alone (CiA 301, 7.3.2.2.3).
+//! Values after a reset. A reset of the communication does not change the objects from 2000h on (CiA 301, 7.3.2.2.3).
 
 use host_tests::bench::{Bench, raw};
 use node::Personality;

@@ -55,7 +55,7 @@ fn cases() -> [Case; 4] {
 
 impl Case {
     /// A node with the threshold and a TPDO of type 255 without an event timer, in Pre-operational at 3000 steps. The
-    /// temperature stays as it is.
+    /// temperature does not change.
     fn booted(&self, id: u8) -> Bench {
         let mut bench = Bench::booted_at(self.personality, id);
         if matches!(self.personality, Personality::Encoder | Personality::Combined) {

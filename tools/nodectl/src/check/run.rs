@@ -264,7 +264,7 @@ impl Subject<'_> {
         self.tidy()?;
         let has_changed = saved != self.parameters()?;
         let left = self.restore(&saved)?;
-        // What the device has taken back is saved, even if it refuses the rest.
+        // The values that the device has accepted are saved, even if it refuses the others.
         if has_changed {
             self.write(0x1010, 1, b"save")?;
         }

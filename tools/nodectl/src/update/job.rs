@@ -15,7 +15,7 @@ use crate::{Network, value};
 /// How long a program may still run after the command to stop it. A node that has lost its power in the meantime runs its
 /// program again.
 const STOP: Duration = Duration::from_millis(5_000);
-/// How often a node is told to stop its program.
+/// How often a node gets the command to stop its program.
 const STOPS: usize = 3;
 /// How long the rest of a broken download may take to arrive.
 const REST: Duration = Duration::from_millis(4_000);

@@ -399,7 +399,7 @@ fn a_node_that_cannot_be_monitored_is_refused() {
     assert!(printed(&wire, &["read", "1016:1"]).contains(" = 0 "));
 }
 
-/// Two values with one meaning are told as numbers.
+/// Two values with one meaning are shown as numbers.
 #[test]
 fn an_entry_of_1016h_that_is_off_differs_from_another_one_by_its_number() {
     let wire = Wire::new(Pressure::new(1));

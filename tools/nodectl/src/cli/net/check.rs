@@ -116,7 +116,7 @@ fn compare(session: &mut Session, planned: &PlannedNode, findings: &mut Vec<Find
     Ok(())
 }
 
-/// The values of a difference in words; as they are where they have one meaning.
+/// The values of a difference in words; as numbers where both have the same words.
 fn texts(catalogue: &Catalogue, Difference { at, first, second }: &Difference) -> [String; 2] {
     let text = |value: &Option<Value>, words: &dyn Fn(&Value) -> String| {
         value.as_ref().map_or("not there".to_owned(), words)
