@@ -257,3 +257,10 @@ fn a_fastscan_with_a_field_out_of_range_is_refused() {
         assert_eq!(parse(bit, part, next), None, "bit {bit}, part {part}, next {next}");
     }
 }
+
+#[test]
+fn a_frame_is_shown_with_its_identifier_its_kind_and_its_data() {
+    let shown = |frame: Option<Frame>| format!("{:?}", frame.unwrap());
+    assert_eq!(shown(Frame::new(0x123, &[1, 2])), "Frame { id: 291, remote: false, len: 2, data: [1, 2] }");
+    assert_eq!(shown(Frame::remote(0x7FF, 8)), "Frame { id: 2047, remote: true, len: 8, data: [] }");
+}

@@ -102,4 +102,9 @@ fn a_short_request_is_taken_if_the_application_wants_it() {
     assert_eq!(answers(of_lax, 3..=8), [1; 6]);
     assert_eq!(answers(of_lax_services, 3..=8), [1; 6]);
     assert_eq!(answers(of_lax, 0..=0), [0], "an empty frame is no request");
+    for other in [0x601 + u16::from(ID), 0x200, 0x580 + u16::from(ID)] {
+        let mut sent = Sent::default();
+        of_lax(&Frame::new(other, &[0x40, 0x00, 0x10]).unwrap(), &mut sent);
+        assert_eq!(sent.0, [], "{other:X}h is no request to this node");
+    }
 }

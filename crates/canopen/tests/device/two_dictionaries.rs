@@ -42,6 +42,18 @@ fn a_dictionary_without_emcy_and_heartbeat_sends_none_in_a_device_with_room_for_
 }
 
 #[test]
+fn the_room_for_several_tables_is_the_largest_of_each_kind() {
+    let rows = canopen::rows!([objects::device_type(0)], objects::heartbeat_consumer::<4>());
+    let [full, watching] = [FULL, rows].map(Sizes::of);
+    assert_eq!((full.watches, watching.watches), (0, 3));
+    for all in [[FULL, rows], [rows, FULL]] {
+        let room = Sizes::of_any(&all);
+        assert!(full.fits(room) && watching.fits(room));
+        assert_eq!((room.image, room.watches), (full.image.max(watching.image), 3));
+    }
+}
+
+#[test]
 fn a_device_has_room_for_a_table_that_is_larger_in_nothing() {
     let room = Sizes::of(FULL);
     assert!(room.fits(room) && Sizes::of(BARE).fits(room) && !room.fits(Sizes::of(BARE)));

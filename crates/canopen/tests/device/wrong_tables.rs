@@ -145,6 +145,8 @@ fn an_error_names_the_row() {
     assert_error(&[&[row(0), row(130).limits(5, 4)]], "20AFh:130: the lower limit is above the upper one");
     assert_error(&[&[row(0), row(15).limits(0, 256)]], "20AFh:15: the limits are wider than the type");
     assert_error(&[&[row(1)]], "20AFh:1: the object has no sub-index 0");
+    let other = Object::new(0x20AE, 0, "", Type::Unsigned8, Access::ReadWrite);
+    assert_error(&[&[other, row(1)]], "20AFh:1: the object has no sub-index 0");
     assert_error(&[&[row(0), row(0)]], "20AFh:0: the row is there twice");
     assert_error(&[&[row(0).real(1.0)]], "20AFh:0: the default is of another type than the entry");
     let timer = Object::new(0x20AF, 0, "", Type::Unsigned16, Access::ReadWrite).event_timer_of(0);
@@ -222,6 +224,8 @@ fn the_cob_id_of_a_service_can_be_used() {
     let emcy = Object::new(0x1014, 0, "", Type::Unsigned32, Access::ReadWrite);
     assert_error(&[&[emcy]], &format!("1014h:0: {taken}"));
     assert_eq!(compile_error(&[&[emcy.value(0x8000_0000)]]), None);
+    // 100h for node-ID 1, and 17Eh for 127.
+    assert_error(&[&[emcy.default(DefaultValue::NodeId(0xFF))]], &format!("1014h:0: {taken}"));
     let wide = "1014h:0: the COB-ID has a CAN-ID of more than 11 bits";
     assert_error(&[&[emcy.value(0x2000_0085)]], wide);
     let mut rows = objects::sync_producer(1000);
