@@ -46,8 +46,6 @@ pub(crate) struct NodeApplication {
     pub(crate) update_log: Log,
     /// Permission to change the program (2003h).
     pub(crate) authorisation: Authorisation,
-    /// The defaults of the application will be valid after the next reset of the node (1011h).
-    pub(crate) is_restored: bool,
     buffer: TransferBuffer,
 }
 
@@ -66,7 +64,6 @@ impl NodeApplication {
             programs: Programs::default(),
             update_log: Log::EMPTY,
             authorisation: Authorisation::default(),
-            is_restored: false,
             buffer: TransferBuffer::EMPTY,
         }
     }
@@ -138,7 +135,6 @@ impl Application for NodeApplication {
         let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
         show(0x1F57, 1, &status.to_le_bytes());
         self.adopt_older_choice(image);
-        self.is_restored &= reset == Reset::Communication;
         let mut defaults = Groups::NONE;
         for group in Group::COMMON {
             let is_loaded = reset == Reset::Node || group == Group::Communication;
@@ -245,11 +241,7 @@ impl Application for NodeApplication {
         self.flags.set(flag_of(group), !good);
     }
 
-    /// A preset stores all parameters of the application, which would end a restore.
     fn admits(&self, entry: &Entry) -> Result<(), Abort> {
-        if self.is_restored && self.stores(entry).is_some() {
-            return Err(Abort::DeviceState);
-        }
         self.admit(entry.index(), entry.sub())
     }
 

@@ -79,9 +79,6 @@ impl Protocol {
         let application = self.device.application_mut();
         application.configured = application.configured.after(job);
         if let Job::Store(groups) | Job::Restore(groups) = job {
-            if groups.contains(Group::Application) {
-                application.is_restored = matches!(job, Job::Restore(_));
-            }
             for group in Group::COMMON.into_iter().filter(|group| groups.contains(*group)) {
                 application.stored.replace(group, done.packed.get(group));
             }

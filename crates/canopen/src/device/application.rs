@@ -152,8 +152,8 @@ pub trait Application {
     fn sent(&mut self, _tpdo: usize, _image: &[u8]) {}
 
     /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response
-    /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, the write is
-    /// refused and has no effect.
+    /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, or if a restore of
+    /// one of them (1011h) waits for its reset, the write is refused and has no effect.
     fn stores(&self, _entry: &Entry) -> Option<Groups> {
         None
     }

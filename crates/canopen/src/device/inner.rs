@@ -5,7 +5,7 @@ use super::pdos::low_half;
 use super::state::{Pending, SELF_START, Scope};
 use super::{Action, Application, Definition, STALE, store};
 use crate::array::Array;
-use crate::dictionary::{Dictionary, Entry, Field, Group, Services, little_endian};
+use crate::dictionary::{Dictionary, Entry, Field, Group, Groups, Services, little_endian};
 use crate::emcy::Fault;
 use crate::nmt::State;
 use crate::pdo::{Choices, Links, ProcessContext, Rpdo, Scanner};
@@ -38,6 +38,8 @@ pub struct Inner<D: Definition> {
     pub(super) rpdo_filter: u32,
     /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and position in `rpdos`.
     pub(super) all_nodes: Option<(CanId, u16)>,
+    /// The groups whose defaults will be in use after the next reset that loads them (1011h).
+    pub(super) restored: Groups,
     pub(super) heartbeat: heartbeat::Producer,
     pub(super) sync: sync::Consumer,
     pub(super) sync_producer: sync::Producer,
@@ -94,6 +96,7 @@ impl<D: Definition> Inner<D> {
             first_rpdos: Links::END,
             jobs: store::Jobs::new(),
             damage: store::Damage::NONE,
+            restored: Groups::NONE,
             is_bus_off: false,
             image: D::Image::NEW,
         }

@@ -137,6 +137,9 @@ impl<D: Definition> Device<D> {
             self.inner.services_due = STALE;
             return self.process_next();
         }
+        if Inner::<D>::has(Services::STORE) && result.is_ok() {
+            self.inner.note_restore();
+        }
         let lss_waits = core::mem::take(&mut self.inner.jobs).lss_waits;
         let context = &mut self.services.context(now, out);
         self.finish_job(result, lss_waits, context);
@@ -173,6 +176,15 @@ impl<D: Definition> Inner<D> {
         }
     }
 
+    /// The running job is done: a restored group waits for its reset, a stored one no longer does.
+    fn note_restore(&mut self) {
+        match self.jobs.running {
+            Some(Job::Restore(groups)) => self.restored.set_all(groups, true),
+            Some(Job::Store(groups)) => self.restored.set_all(groups, false),
+            _ => (),
+        }
+    }
+
     /// Hands a job to the caller. An equal [`Job::Store`] that has been handed over already runs again, because its
     /// values may have been copied before this request. The other jobs carry their values.
     fn begin(&mut self, job: Job) -> Result<(), Abort> {
@@ -187,12 +199,16 @@ impl<D: Definition> Inner<D> {
     }
 
     /// The job that a write to the entry begins, for an entry that the application stores at once. Nothing changes: an
-    /// error refuses the write.
+    /// error refuses the write. So does a restore that waits for its reset, because the job would store all values of the
+    /// group again.
     pub(super) fn job_of(&self, entry: &Entry) -> Result<Option<Job>, Abort> {
         if !Self::has(Services::FAULTS) {
             return Ok(None);
         }
         let groups = self.application.stores(entry).filter(|_| !entry.rule().is_command());
+        if Self::has(Services::STORE) && groups.is_some_and(|groups| groups.meets(self.restored)) {
+            return Err(Abort::DeviceState);
+        }
         let job = groups.map(Job::Store);
         job.map_or(Ok(()), |job| self.check_job(job))?;
         Ok(job)
@@ -259,6 +275,9 @@ impl<D: Definition> Inner<D> {
     pub(super) fn load_stored(&mut self, group: Group) {
         let Stored { packed, soundness } = self.application.stored(group);
         let (dictionary, node_id) = (self.dictionary, self.node_id);
+        if Self::has(Services::STORE) {
+            self.restored.set(group, false);
+        }
         // An application that stores nothing returns this constant, and the compiler removes the rest.
         if packed.is_empty() && soundness == Soundness::Whole {
             self.damage.set(group, soundness);

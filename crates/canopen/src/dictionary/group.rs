@@ -109,6 +109,16 @@ impl Groups {
         self.0 = if contains { self.0 | bit } else { self.0 & !bit };
     }
 
+    /// Whether two sets have a group in common.
+    pub(crate) const fn meets(self, other: Groups) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// Adds groups or removes them.
+    pub(crate) fn set_all(&mut self, groups: Groups, contains: bool) {
+        self.0 = if contains { self.0 | groups.0 } else { self.0 & !groups.0 };
+    }
+
     /// The groups of the set.
     pub fn iter(self) -> impl Iterator<Item = Group> {
         Group::ALL.into_iter().filter(move |group| self.contains(*group))

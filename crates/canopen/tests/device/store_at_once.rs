@@ -12,6 +12,8 @@ const SAVED: [u8; 8] = [0x60, 0x10, 0x10, 3, 0, 0, 0, 0];
 /// 6201h, which is stored at once.
 const PRESET: u16 = 0x6201;
 const DEVICE_STATE: u32 = 0x0800_0022;
+const RESET_NODE: u8 = 0x81;
+const RESET_COMMUNICATION: u8 = 0x82;
 const RPDO: u16 = 0x205;
 const EMCY: u16 = 0x085;
 
@@ -195,4 +197,37 @@ fn a_setting_begins_one_job_although_the_application_stores_the_entry_too() {
     assert_eq!(finish(&mut bench, Ok(())), [[0x60, 0, 0x5F, 0, 0, 0, 0, 0]]);
     assert_eq!(job(&mut bench), None);
     assert_eq!(bench.write(0x6200, 0, &[0, 0]), Ok(()), "the next request is answered at once");
+}
+
+/// A restore waits for the reset that loads the group. A write that stores the group again would end it.
+#[test]
+fn a_restore_is_ended_by_a_save_and_by_the_reset_only() {
+    for sub in [1, 3] {
+        let mut bench = booted();
+        let load = [0x23, 0x11, 0x10, sub, b'l', b'o', b'a', b'd'];
+        request(&mut bench, load);
+        assert!(matches!(job(&mut bench), Some(Job::Restore(_))));
+        assert_eq!(finish(&mut bench, Ok(())), [[0x60, 0x11, 0x10, sub, 0, 0, 0, 0]]);
+        let before = value(&bench);
+        assert_eq!(bench.write(PRESET, 0, &[7]), Err(DEVICE_STATE));
+        assert_eq!((value(&bench), job(&mut bench)), (before, None), "no effect");
+        // A save of the same values, as the client wishes.
+        request(&mut bench, SAVE);
+        assert!(matches!(job(&mut bench), Some(Job::Store(_))));
+        assert_eq!(finish(&mut bench, Ok(())), [SAVED]);
+        request(&mut bench, preset(7));
+        assert!(matches!(job(&mut bench), Some(Job::Store(_))));
+        finish(&mut bench, Ok(()));
+        // Again, and the resets.
+        request(&mut bench, load);
+        job(&mut bench);
+        finish(&mut bench, Ok(()));
+        for (command, is_over) in [(RESET_COMMUNICATION, false), (RESET_NODE, true)] {
+            bench.nmt(command);
+            bench.start();
+            while bench.take_action().is_some() {}
+            let is_refused = bench.ask_raw(preset(8)).is_some();
+            assert_eq!(is_refused, !is_over, "1011h:{sub}, {command:X}h");
+        }
+    }
 }
