@@ -70,7 +70,7 @@ pub struct Tpdo {
     settings: Settings,
     /// A transmission waits: for the end of the inhibit time, or for room in the queue.
     pending: bool,
-    /// It has been sent since [`Tpdo::take_sent`].
+    /// A transmission since the last [`Tpdo::take_sent`].
     is_sent: bool,
     /// SYNCs since the last transmission.
     syncs: u8,

@@ -150,7 +150,7 @@ impl<'n> Client<'n> {
             let mut service = begin(Options { retries: 0, limit: left, ..options });
             match self.in_turn(left, &mut service, &mut progress) {
                 Ok(()) => return Ok(service),
-                Err(cause) if retries > 0 && is_worth_a_retry(&cause) => retries -= 1,
+                Err(Cause::Transfer(error)) if retries > 0 && error.is_worth_a_retry() => retries -= 1,
                 Err(cause) => break cause,
             }
         };
@@ -180,15 +180,6 @@ impl<'n> Client<'n> {
         let channel = self.network.channel(node);
         let mut via = Via { service, node, channel };
         Ok(self.network.run_with(&mut via, |via| progress(via.service))??)
-    }
-}
-
-/// Whether another attempt may succeed: a frame was lost, or came twice.
-fn is_worth_a_retry(cause: &Cause) -> bool {
-    match cause {
-        Cause::Transfer(sdo::Error::NoAnswer | sdo::Error::Unexpected) => true,
-        Cause::Transfer(sdo::Error::Abort(code)) => code.is_time_out(),
-        _ => false,
     }
 }
 

@@ -42,7 +42,8 @@ impl Error {
     }
 
     /// Whether another attempt may succeed: a frame was lost, or came twice.
-    pub(super) fn is_worth_a_retry(self) -> bool {
+    #[must_use]
+    pub fn is_worth_a_retry(self) -> bool {
         match self {
             Error::NoAnswer | Error::Unexpected => true,
             Error::Abort(code) => code.is_time_out(),

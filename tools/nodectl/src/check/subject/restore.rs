@@ -82,7 +82,7 @@ impl Subject<'_> {
     /// Writes back the objects that were written since a length of the list, with their first values.
     pub(in crate::check) fn put_back_since(&mut self, length: usize) -> Outcome {
         let written = self.written.split_off(length.min(self.written.len()));
-        // Of several values of an object the first one, which is inserted last, counts.
+        // In reverse order, the first value of an object replaces the later ones.
         let former =
             written.into_iter().rev().map(|(Multiplexer { index, sub }, bytes)| ((index, sub), bytes));
         let left = self.bring(&former.collect())?;
