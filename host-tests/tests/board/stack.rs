@@ -19,5 +19,5 @@ pub(crate) fn assert_bound(world: &World, ran: &[&str]) {
 
 #[test]
 fn the_tasks_stay_within_the_bound_of_their_stack() {
-    assert_bound(&busy_run(Estimate::Modelled), &["bootloader", "firmware"]);
+    assert_bound(&busy_run(Estimate::Modelled, |_| ()), &["bootloader", "firmware"]);
 }

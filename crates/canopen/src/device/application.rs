@@ -147,8 +147,8 @@ pub trait Application {
         false
     }
 
-    /// A TPDO, whose position is as for [`is_quiet`](Application::is_quiet), has been sent with the values of the image, for
-    /// whatever reason. Only called with [`THRESHOLDS`](Application::THRESHOLDS).
+    /// A TPDO that sends on changes has been sent with the values of the image, for whatever reason. Its position is as for
+    /// [`is_quiet`](Application::is_quiet). Only called with [`THRESHOLDS`](Application::THRESHOLDS).
     fn sent(&mut self, _tpdo: usize, _image: &[u8]) {}
 
     /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response

@@ -366,7 +366,7 @@ impl Tpdo {
         self.pending = !is_sent;
         if is_sent {
             (self.data, self.sent) = (Some(data), context.now);
-            self.is_sent |= C::THRESHOLDS;
+            self.is_sent |= C::THRESHOLDS && self.settings.sends_on_change();
         } else {
             self.inhibited_until = context.now.plus(RETRY);
         }
