@@ -127,7 +127,12 @@ pub(crate) fn little_endian(bytes: &[u8]) -> u32 {
     if let Some(bytes) = bytes.first_chunk() {
         return u32::from_le_bytes(*bytes);
     }
-    bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
+    few(bytes)
+}
+
+#[inline(never)]
+fn few(bytes: &[u8]) -> u32 {
+    bytes.iter().rfold(0, |value, &byte| value << 8 | u32::from(byte))
 }
 
 /// Refuses infinity and NaN: as a parameter, they would make every measured value invalid.

@@ -115,9 +115,8 @@ impl Dictionary {
             Direction::Transmit => 0x1800,
             Direction::Receive => 0x1400,
         };
-        let begin = self.series.partition_point(|series| series.index < first);
         let mut rest = place;
-        for series in self.series.get(begin..)?.iter().take_while(|series| series.index & 0xFE00 == first) {
+        for series in self.series.iter().filter(|series| series.index & 0xFE00 == first) {
             match rest.checked_sub(series.objects.into()) {
                 None => return Some(series.index.wrapping_add(rest)),
                 Some(less) => rest = less,

@@ -1,8 +1,11 @@
 //! Block download (CiA 301, 7.2.4.3.9 to 11): the client sends up to 127 segments before it waits for an answer.
 
 use super::objects::{BUFFER, Sink};
-use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects};
+use super::{Abort, BlockEnd, BlockSize, Objects};
 use crate::Tick;
+
+/// Bit of the first byte of a segment: no other follows.
+const LAST: u8 = 0x80;
 
 /// A block download under way.
 #[derive(Clone, Copy, Debug)]
@@ -11,17 +14,14 @@ pub(super) struct Receiver {
     check_crc: bool,
     /// Sequence number of the next segment.
     next: u8,
-    /// The newest segment that `take` has processed, in sequence or not. A segment that arrives twice in a row counts
-    /// once.
-    newest: Option<BlockSegment>,
+    /// The sequence number of the newest segment of this block that `take` has processed, in sequence or not; 0 before the
+    /// first.
+    newest: u8,
     /// The value of `next` after that segment. If `next` has advanced, `take_next` has taken other segments since then.
     next_then: u8,
-    /// Whether any segment of this block has arrived.
-    has_begun: bool,
     /// The sequence number of the last acknowledge.
     acknowledged: u8,
-    /// Whether the last segment of the transfer has arrived, which is `newest` then. The end of the transfer tells how many
-    /// of its bytes are data.
+    /// Whether the last segment of the transfer has arrived. The end of the transfer tells how many of its bytes are data.
     is_complete: bool,
     /// The error of a segment. The end of the block reports it: the client sends the whole block before it listens, and
     /// no segment that is still on its way may be taken for a request.
@@ -34,9 +34,8 @@ impl Receiver {
             sink,
             check_crc,
             next: 1,
-            newest: None,
+            newest: 0,
             next_then: 1,
-            has_begun: false,
             acknowledged: 0,
             is_complete: false,
             verdict: Ok(()),
@@ -54,8 +53,7 @@ impl Receiver {
 
     /// The highest sequence number that has arrived in this block; 0 before the first.
     pub(super) fn highest(&self) -> u8 {
-        let newest = self.newest.as_ref().map_or(0, |segment| segment.sequence.get());
-        (self.next - 1).max(if self.has_begun { newest } else { 0 })
+        (self.next - 1).max(self.newest)
     }
 
     /// The sequence number before the client's next segment. After an acknowledge within a block, it depends on whether the
@@ -70,7 +68,7 @@ impl Receiver {
 
     /// Whether a block has begun and is not complete. If its last segment is lost, only a time-out can end the block.
     pub(super) fn is_within_block(&self) -> bool {
-        self.expects_segments() && self.has_begun
+        self.expects_segments() && self.newest != 0
     }
 
     /// Takes a frame that is the next segment of a block, if the buffer has room for a whole segment. Most frames of a
@@ -86,21 +84,22 @@ impl Receiver {
         is_taken
     }
 
-    /// Takes a segment. Returns `true` at the end of a block. The client sends segments after a gap again.
+    /// Takes a segment. `is_repeated`: the frame is the same as the one before. Such a segment counts once. Returns `true` at
+    /// the end of a block. The client sends segments after a gap again.
     pub(super) fn take(
         &mut self,
-        segment: BlockSegment,
+        frame: &[u8; 8],
+        is_repeated: bool,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> bool {
-        self.has_begun = true;
-        let is_in_a_row = self.next_then == self.next;
-        if self.newest.replace(segment) == Some(segment) && is_in_a_row {
+        self.newest = frame[0] & !LAST;
+        if is_repeated && self.next_then == self.next {
             return false;
         }
-        let is_end = segment.last || segment.sequence == BlockSize::MAX;
+        let is_end = frame[0] & LAST != 0 || self.newest == BlockSize::MAX.get();
         if self.verdict.is_ok() {
-            self.verdict = self.store(segment, is_end, buffer, objects);
+            self.verdict = self.store(frame, is_end, buffer, objects);
             // `take_next` may take the following segments, except for the last segment of the block.
             let direct =
                 if self.verdict.is_ok() { BlockSize::MAX.get().saturating_sub(self.next) } else { 0 };
@@ -113,16 +112,17 @@ impl Receiver {
     /// Stores the data of a segment.
     fn store(
         &mut self,
-        segment: BlockSegment,
+        frame: &[u8; 8],
         is_end: bool,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if segment.sequence.get() == self.next {
+        let [first, data @ ..] = frame;
+        if first & !LAST == self.next {
             self.next += 1;
-            self.is_complete = segment.last;
-            if !segment.last {
-                self.sink.append(&segment.data, buffer, objects)?;
+            self.is_complete = first & LAST != 0;
+            if !self.is_complete {
+                self.sink.append(data, buffer, objects)?;
             }
         }
         if is_end { self.sink.hand_over(buffer, objects) } else { Ok(()) }
@@ -132,23 +132,24 @@ impl Receiver {
     pub(super) fn acknowledge(&mut self) -> Result<u8, Abort> {
         self.verdict?;
         self.acknowledged = self.next - 1;
-        self.has_begun = false;
+        self.newest = 0;
         self.next_then = 1;
         self.sink.allow_direct(0);
         self.next = 1;
         Ok(self.acknowledged)
     }
 
-    /// Completes the transfer.
+    /// Completes the transfer. `last` is the frame of the last segment.
     pub(super) fn end(
         &mut self,
         end: BlockEnd,
+        last: &[u8; 8],
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
         now: Tick,
     ) -> Result<(), Abort> {
-        if let Some(BlockSegment { data: last, .. }) = self.newest.as_ref().filter(|_| self.is_complete) {
-            let data = last.get(..7 - usize::from(end.unused.min(7))).unwrap_or(last);
+        if self.is_complete {
+            let data = last.get(1..8 - usize::from(end.unused)).unwrap_or_default();
             self.sink.append(data, buffer, objects)?;
         }
         if self.check_crc && self.sink.crc(buffer) != end.crc {

@@ -1,5 +1,7 @@
 //! An array of up to `N` bytes.
 
+use crate::copy::copy;
+
 /// Up to `N` bytes (`N` below 256). The unused rest is zero, so that equal content compares equal.
 ///
 /// The alignment makes the size a whole number of words, also inside another structure.
@@ -31,12 +33,9 @@ impl<const N: usize> Bytes<N> {
             return Bytes { data: *full, len: Self::CAPACITY };
         }
         let mut data = [0; N];
-        let mut len = 0;
-        for (to, from) in data.iter_mut().zip(bytes) {
-            *to = *from;
-            len += 1;
-        }
-        Bytes { data, len }
+        copy(&mut data, bytes);
+        #[allow(clippy::cast_possible_truncation)] // Below N.
+        Bytes { data, len: bytes.len() as u8 }
     }
 
     #[allow(clippy::cast_possible_truncation)] // N is below 256.

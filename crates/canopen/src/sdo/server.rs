@@ -218,9 +218,10 @@ impl<O: Objects> Server<O> {
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
         }
-        let answer = match self.block_segment(frame, is_repeated) {
-            Some(segment) => self.take_block_segment(segment, objects),
-            None => self.dispatch(frame, is_repeated, objects, now),
+        let answer = if self.is_block_segment(frame, is_repeated) {
+            self.take_block_segment(frame, is_repeated, objects)
+        } else {
+            self.dispatch(frame, is_repeated, objects, now)
         };
         let has_reply = self.settle(answer, objects, now);
         (self.previous, self.is_answered) = (*frame, has_reply);
@@ -241,15 +242,11 @@ impl<O: Objects> Server<O> {
             && matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.expects_segments())
     }
 
-    /// The frame as a segment of a block download. Within a block, every frame is a segment, unless its first byte is
-    /// the one of an abort message. After the last block, only a repetition of the last segment is one.
-    fn block_segment(&self, frame: &[u8; 8], is_repeated: bool) -> Option<BlockSegment> {
-        let Transfer::BlockDownload(receiver) = &self.transfer else { return None };
-        if !O::BLOCK_DOWNLOAD {
-            return None;
-        }
-        let segment = BlockSegment::parse(*frame)?;
-        (receiver.expects_segments() || is_repeated).then_some(segment)
+    /// Whether a frame is a segment of a block download. Within a block, every frame is one, unless its first byte is the one of
+    /// an abort message. After the last block, only a repetition of the last segment is one.
+    fn is_block_segment(&self, frame: &[u8; 8], is_repeated: bool) -> bool {
+        let Transfer::BlockDownload(receiver) = &self.transfer else { return false };
+        O::BLOCK_DOWNLOAD && frame[0] & 0x7F != 0 && (receiver.expects_segments() || is_repeated)
     }
 
     /// Stores the frame of a response. Returns `true`: there is a reply.

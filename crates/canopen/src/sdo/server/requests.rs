@@ -7,7 +7,7 @@ use crate::sdo::block_upload::Sender;
 use crate::sdo::objects::{Sink, Source};
 use crate::sdo::segmented::{Download, Upload};
 use crate::sdo::{
-    Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE,
+    Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE,
     Writable, tail,
 };
 
@@ -206,9 +206,9 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
-    pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut O) -> Answer {
+    pub(super) fn take_block_segment(&mut self, frame: &[u8; 8], is_repeated: bool, objects: &mut O) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
-        if !receiver.take(segment, &mut self.buffer, objects) {
+        if !receiver.take(frame, is_repeated, &mut self.buffer, objects) {
             return Ok(false);
         }
         let sequence = receiver.acknowledge()?;
@@ -217,7 +217,7 @@ impl<O: Objects> Server<O> {
 
     fn block_download_end(&mut self, end: BlockEnd, objects: &mut O, now: Tick) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
-        receiver.end(end, &mut self.buffer, objects, now)?;
+        receiver.end(end, &self.previous, &mut self.buffer, objects, now)?;
         self.transfer = Transfer::Idle;
         self.set_reply(Response::BlockDownloaded);
         Ok(self.written(objects))
