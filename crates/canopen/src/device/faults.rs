@@ -147,43 +147,31 @@ impl<D: Definition> Inner<D> {
         self.clear(Fault::MpdoNotTaken, now);
     }
 
+    pub(super) fn raise(&mut self, fault: Fault, now: Tick) {
+        self.set_fault(fault, true, now);
+    }
+
+    pub(super) fn clear(&mut self, fault: Fault, now: Tick) {
+        self.set_fault(fault, false, now);
+    }
+
     // Not inlined: many callers, none of them time-critical.
     #[inline(never)]
-    pub(super) fn raise(&mut self, fault: Fault, now: Tick) {
-        let is_new = if Self::has(Services::EMCY) {
+    pub(super) fn set_fault(&mut self, fault: Fault, active: bool, now: Tick) {
+        let is_change = if Self::has(Services::EMCY) {
             let detail = match fault {
-                Fault::Application(number) => self.application.fault_detail(number),
+                Fault::Application(number) if active => self.application.fault_detail(number),
                 _ => None,
             };
-            self.emcy.raise(fault, detail, now)
+            self.emcy.set(fault, active, detail, now)
         } else {
-            self.emcy.raise_silently(fault)
+            self.emcy.set_silently(fault, active)
         };
-        if is_new {
-            self.fault_changed(fault, true);
+        if is_change {
+            self.update_error_register();
+            self.application.fault(fault, active, self.image.as_mut());
+            self.services_due = STALE;
         }
-    }
-
-    #[inline(never)]
-    pub(super) fn clear(&mut self, fault: Fault, now: Tick) {
-        let was_active = if Self::has(Services::EMCY) {
-            self.emcy.clear(fault, now)
-        } else {
-            self.emcy.clear_silently(fault)
-        };
-        if was_active {
-            self.fault_changed(fault, false);
-        }
-    }
-
-    pub(super) fn set_fault(&mut self, fault: Fault, active: bool, now: Tick) {
-        if active { self.raise(fault, now) } else { self.clear(fault, now) }
-    }
-
-    fn fault_changed(&mut self, fault: Fault, active: bool) {
-        self.update_error_register();
-        self.application.fault(fault, active, self.image.as_mut());
-        self.services_due = STALE;
     }
 
     pub(super) fn update_error_register(&mut self) {

@@ -130,27 +130,24 @@ impl Producer {
         }
     }
 
-    /// Sets a fault. Returns whether the fault is new.
-    pub(crate) fn raise(&mut self, fault: Fault, detail: Detail, now: Tick) -> bool {
-        let is_new = self.active.set(fault, true);
-        if is_new {
+    /// Sets or clears a fault. Returns whether this is a change. After the last active fault, code 0000h is sent.
+    pub(crate) fn set(&mut self, fault: Fault, active: bool, detail: Detail, now: Tick) -> bool {
+        let is_change = self.active.set(fault, active);
+        if is_change && active {
             self.errors |= self.repeat(fault, detail, now);
+        } else if is_change && self.active.is_empty() {
+            self.report(0, [0; 5], now);
         }
-        is_new
+        is_change
     }
 
-    /// As [`Producer::raise`], for a device without EMCY: no message waits.
-    pub(crate) fn raise_silently(&mut self, fault: Fault) -> bool {
-        let is_new = self.active.set(fault, true);
-        if is_new {
+    /// As [`Producer::set`], for a device without EMCY: no message waits.
+    pub(crate) fn set_silently(&mut self, fault: Fault, active: bool) -> bool {
+        let is_change = self.active.set(fault, active);
+        if is_change && active {
             self.errors |= fault.condition(self.conditions).class.map_or(0, error_bit);
         }
-        is_new
-    }
-
-    /// As [`Producer::clear`], for a device without EMCY.
-    pub(crate) fn clear_silently(&mut self, fault: Fault) -> bool {
-        self.active.set(fault, false)
+        is_change
     }
 
     /// As [`Producer::restart`], for a device without EMCY.
@@ -158,7 +155,7 @@ impl Producer {
         self.errors = 0;
         let active = core::mem::take(&mut self.active);
         for fault in active.singles() {
-            self.raise_silently(fault);
+            self.set_silently(fault, true);
         }
     }
 
@@ -198,15 +195,6 @@ impl Producer {
     /// Whether no message waits.
     pub(crate) fn is_idle(&self) -> bool {
         self.waiting.len == 0
-    }
-
-    /// Clears a fault. Returns whether the fault was active. After the last active fault, code 0000h is sent.
-    pub(crate) fn clear(&mut self, fault: Fault, now: Tick) -> bool {
-        let was_active = self.active.set(fault, false);
-        if was_active && self.active.is_empty() {
-            self.report(0, [0; 5], now);
-        }
-        was_active
     }
 
     fn report(&mut self, code: u16, detail: [u8; 5], now: Tick) {
