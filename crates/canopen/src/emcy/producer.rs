@@ -116,15 +116,14 @@ impl Producer {
         self.history.clear();
         self.forget_waiting();
         self.errors = 0;
-        let active = core::mem::take(&mut self.active);
-        self.raise_singles(active, details, now);
+        self.active.forget_several();
+        self.raise_singles(details, now);
     }
 
     // Not inlined: two callers, and much code.
     #[inline(never)]
-    fn raise_singles(&mut self, faults: FaultSet, details: impl Fn(u8) -> Detail, now: Tick) {
-        for fault in faults.singles() {
-            self.active.set(fault, true);
+    fn raise_singles(&mut self, details: impl Fn(u8) -> Detail, now: Tick) {
+        for fault in self.active.singles() {
             let detail = if let Fault::Application(number) = fault { details(number) } else { None };
             self.errors |= self.repeat(fault, detail, now);
         }
@@ -145,17 +144,23 @@ impl Producer {
     pub(crate) fn set_silently(&mut self, fault: Fault, active: bool) -> bool {
         let is_change = self.active.set(fault, active);
         if is_change && active {
-            self.errors |= fault.condition(self.conditions).class.map_or(0, error_bit);
+            self.errors |= self.class_of(fault);
         }
         is_change
+    }
+
+    /// The bit of the class of a fault.
+    #[inline(never)]
+    fn class_of(&self, fault: Fault) -> u8 {
+        fault.condition(self.conditions).class.map_or(0, error_bit)
     }
 
     /// As [`Producer::restart`], for a device without EMCY.
     pub(crate) fn restart_silently(&mut self) {
         self.errors = 0;
-        let active = core::mem::take(&mut self.active);
-        for fault in active.singles() {
-            self.set_silently(fault, true);
+        self.active.forget_several();
+        for fault in self.active.singles() {
+            self.errors |= self.class_of(fault);
         }
     }
 
@@ -170,7 +175,7 @@ impl Producer {
     /// Reports the active faults again, without those of heartbeats and RPDOs. They are no new errors.
     pub(crate) fn repeat_singles(&mut self, details: impl Fn(u8) -> Detail, now: Tick) {
         let errors = self.errors;
-        self.raise_singles(self.active, details, now);
+        self.raise_singles(details, now);
         self.errors = errors;
     }
 
