@@ -205,10 +205,13 @@ impl<D: Definition> Inner<D> {
     }
 
     pub(super) fn load_defaults(&mut self, scope: Scope) {
-        for entry in self.dictionary.entries().filter(|entry| scope.contains(entry)) {
+        for entry in self.dictionary.entries() {
+            if !scope.contains(&entry) {
+                continue;
+            }
             if entry.attributes.node_relative {
-                let default = self.default_number(&entry);
-                entry.field.store(self.image.as_mut(), default.to_le_bytes());
+                let number = self.default_number(&entry).to_le_bytes();
+                entry.field.set(self.image.as_mut(), &number);
             } else if entry.rule().has_place() {
                 entry.field.set(self.image.as_mut(), self.dictionary.default(&entry));
             }
