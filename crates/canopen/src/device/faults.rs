@@ -6,6 +6,7 @@ use super::{Application, Device, Next, STALE};
 use crate::dictionary::Services;
 use crate::emcy::{ErrorClass, Fault};
 use crate::nmt::State;
+use crate::pdo::RpdoFault;
 use crate::{Instant, Span, Tick};
 
 /// Error behaviour.
@@ -117,8 +118,12 @@ impl<D: Definition> Inner<D> {
         for number in self.watches.lost() {
             let _ = self.emcy.repeat(Fault::Heartbeat(number), None, now);
         }
-        for fault in self.rpdos.as_ref().iter().flat_map(crate::pdo::Rpdo::active) {
-            let _ = self.emcy.repeat(fault, None, now);
+        for rpdo in self.rpdos.as_ref() {
+            for kind in RpdoFault::ALL {
+                if rpdo.has(kind) {
+                    let _ = self.emcy.repeat(rpdo.fault(kind), None, now);
+                }
+            }
         }
         self.services_due = STALE;
     }

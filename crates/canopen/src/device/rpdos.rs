@@ -4,7 +4,7 @@ use super::Definition;
 use super::inner::Inner;
 use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, Services, little_endian};
-use crate::pdo::{Chain, MappedObject, Reception, Rpdo, RpdoFault};
+use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Tick};
 
 impl<D: Definition> Inner<D> {
@@ -136,7 +136,7 @@ impl<D: Definition> Inner<D> {
 
     /// Whether an RPDO has not arrived in time.
     pub(super) fn misses_rpdo(&self) -> bool {
-        self.rpdos.as_ref().iter().any(Rpdo::is_missing)
+        self.rpdos.as_ref().iter().any(|rpdo| rpdo.has(RpdoFault::Deadline))
     }
 
     /// Clears the faults of a PDO that is reconfigured.

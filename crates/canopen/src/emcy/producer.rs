@@ -3,7 +3,7 @@
 use super::history::History;
 use super::{Condition, ErrorClass, Fault, FaultSet, Message};
 use crate::transmit::{Context, RETRY};
-use crate::{CobId, Frame, Span, Tick, Transmit};
+use crate::{CanId, CobId, Frame, Span, Tick, Transmit};
 
 /// Number of messages that can wait for the transmit queue or the inhibit time. A further message replaces the newest
 /// one.
@@ -50,7 +50,7 @@ pub(crate) struct Producer {
     /// Conditions of the application.
     conditions: &'static [Condition],
     /// 1014h; `None` while bit 31 disables EMCY.
-    id: Option<CobId>,
+    id: Option<CanId>,
     /// The bits of the error register that the device supports.
     register_bits: u8,
     /// The sub-indexes of 1029h that apply to new faults, one bit for each, until [`Producer::take_error`].
@@ -89,7 +89,7 @@ impl Producer {
 
     /// Takes the COB-ID of 1014h. Bit 31 disables EMCY. Returns whether this value switches EMCY on.
     pub(crate) fn configure(&mut self, value: u32) -> bool {
-        let id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+        let id = CobId::enabled(value);
         let was_on = core::mem::replace(&mut self.id, id).is_some();
         id.is_some() && !was_on
     }
@@ -250,9 +250,9 @@ impl Producer {
         if context.now < self.due {
             return;
         }
-        let Some(cob_id) = self.id else { return self.forget_waiting() };
+        let Some(id) = self.id else { return self.forget_waiting() };
         while let Some(message) = self.waiting.front() {
-            if !context.send(Frame::data_frame(cob_id.id, 8, message)) {
+            if !context.send(Frame::data_frame(id, 8, message)) {
                 self.due = context.now.plus(RETRY);
                 return;
             }

@@ -206,22 +206,14 @@ impl Rpdo {
         }
     }
 
-    /// The active faults.
-    pub(crate) fn active(&self) -> impl Iterator<Item = Fault> {
-        RpdoFault::ALL
-            .into_iter()
-            .filter(|kind| self.faults & 1 << *kind as u8 != 0)
-            .map(|kind| self.fault(kind))
+    /// Whether a fault is active.
+    pub(crate) fn has(&self, kind: RpdoFault) -> bool {
+        self.faults & 1 << kind as u8 != 0
     }
 
     /// Whether any fault is active.
     pub(crate) fn has_faults(&self) -> bool {
         self.faults != 0
-    }
-
-    /// Whether it has not arrived in time.
-    pub(crate) fn is_missing(&self) -> bool {
-        self.faults & 1 << RpdoFault::Deadline as u8 != 0
     }
 
     /// When the next frame is missing.
