@@ -252,8 +252,8 @@ impl Iterator for Entries {
     #[inline(never)]
     fn next(&mut self) -> Option<Entry> {
         let series = self.dictionary.series.get(self.series)?;
-        let place = *self.dictionary.places_of(series).get(self.place)?;
-        let entry = self.dictionary.entry(series, self.object, place);
+        let place = self.dictionary.places_of(series).get(self.place)?;
+        let entry = self.dictionary.find(series.index.wrapping_add(self.object), place.sub);
         self.place += 1;
         if self.place == series.entries.into() {
             (self.object, self.place) = (self.object + 1, 0);
@@ -261,6 +261,6 @@ impl Iterator for Entries {
         if self.object == series.objects.into() {
             (self.series, self.object) = (self.series + 1, 0);
         }
-        entry
+        entry.ok()
     }
 }
