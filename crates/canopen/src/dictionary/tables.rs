@@ -137,11 +137,11 @@ impl Dictionary {
     /// `NoObject` for an unknown index, `NoSubIndex` for an unknown sub-index of a known object.
     pub fn find(&self, index: u16, sub: u8) -> Result<Entry, Abort> {
         let (series, number) = self.series_of(index, sub)?;
+        let places = self.places_of(series);
         // Most objects have the sub-indexes 0, 1, 2 and so on.
-        let direct = self.places.get(usize::from(series.first) + usize::from(sub));
-        let place = match direct {
-            Some(place) if place.sub == sub && sub < series.entries => Some(place),
-            _ => self.places_of(series).iter().find(|place| place.sub == sub),
+        let place = match places.get(usize::from(sub)) {
+            Some(place) if place.sub == sub => Some(place),
+            _ => places.iter().find(|place| place.sub == sub),
         };
         place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
