@@ -52,14 +52,6 @@ impl Node for Ours {
 }
 
 impl Ours {
-    fn new(application: crate::Keeper) -> Ours {
-        Ours {
-            device: Device::new(&crate::DICTIONARY, NodeId::new(ID), application),
-            driver: Driver::new(),
-            alarms: [Instant(0); 2],
-        }
-    }
-
     /// Does what the device leaves to its caller.
     fn fulfil(&mut self, action: Action, now: Instant) -> Next {
         match action {
@@ -79,7 +71,11 @@ impl Ours {
 
 /// Starts the device, and carries out the host's requests.
 pub(crate) fn run(node: &mut MaybeUninit<Ours>, application: crate::Keeper) -> ! {
-    let node = node.write(Ours::new(application));
+    let node = node.write(Ours {
+        device: Device::new(&crate::DICTIONARY, NodeId::new(ID), application),
+        driver: Driver::new(),
+        alarms: [Instant(0); 2],
+    });
     let _ = node.device.start(Instant(0), &mut node.driver);
     bench_images::run(node)
 }

@@ -41,8 +41,10 @@ pub enum Fault {
 }
 
 /// A fault as EMCY, error register and object 1029h treat it.
+// Whole words are copied without a call of `memcpy`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(align(4))]
 pub struct Condition {
     /// Emergency error code (CiA 301, table 26, and the device profile).
     pub code: u16,

@@ -54,7 +54,9 @@ pub(crate) enum Content {
 
 /// The locations of the mapped values in the image, in the order of the PDO data. Adjacent values, such as those of one
 /// object, are merged to one location.
+// Whole words are copied without a call of `memcpy`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(align(4))]
 pub(crate) struct Layout {
     /// Length of the PDO in bytes.
     len: u8,

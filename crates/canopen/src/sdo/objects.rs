@@ -144,13 +144,42 @@ const fn in_buffer(len: usize) -> u8 {
     len as u8
 }
 
+/// The room for a download.
+// Checked before there is a destination: a destination in a result would be copied.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room {
+    is_stream: bool,
+    limit: usize,
+}
+
+impl Room {
+    /// Begins a download. `TooLong` when the client announces more bytes than there is room for.
+    pub(super) fn of(at: Multiplexer, size: Option<u32>, objects: &mut impl Objects) -> Result<Room, Abort> {
+        let announced = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
+        let (is_stream, most) = match objects.writable(at)? {
+            Writable::Value(most) => (false, most),
+            Writable::Stream => (true, usize::MAX),
+        };
+        let limit = announced.unwrap_or(most);
+        if limit > most {
+            return Err(Abort::TooLong);
+        }
+        if is_stream {
+            objects.stream(at, Part::Begin(announced))?;
+        }
+        Ok(Room { is_stream, limit })
+    }
+}
+
 /// The destination of a download. A value is collected in the buffer and written when it is complete. The data of a
 /// stream is passed on whenever the buffer is full.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(4))]
 pub(super) struct Sink {
     at: Multiplexer,
-    kind: Writable,
-    announced: Option<usize>,
+    is_stream: bool,
+    /// Whether the client has announced the number of bytes, which is the limit then.
+    is_announced: bool,
     /// The maximum number of bytes of this download.
     limit: usize,
     /// Number of bytes that have been passed on, and their CRC.
@@ -163,26 +192,10 @@ pub(super) struct Sink {
 }
 
 impl Sink {
-    /// Begins a download. `TooLong` when the client announces more bytes than there is room for.
-    pub(super) fn open(
-        at: Multiplexer,
-        size: Option<u32>,
-        objects: &mut impl Objects,
-    ) -> Result<Sink, Abort> {
-        let announced = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
-        let kind = objects.writable(at)?;
-        let limit = match kind {
-            Writable::Value(limit) if announced.is_some_and(|size| size > limit) => {
-                return Err(Abort::TooLong);
-            }
-            Writable::Value(limit) => limit,
-            Writable::Stream => {
-                objects.stream(at, Part::Begin(announced))?;
-                usize::MAX
-            }
-        };
-        let limit = announced.map_or(limit, |size| size.min(limit));
-        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, direct: 0 })
+    /// The destination for a download of so many bytes, if the client announces them.
+    pub(super) fn new(at: Multiplexer, size: Option<u32>, room: Room) -> Sink {
+        let Room { is_stream, limit } = room;
+        Sink { at, is_stream, is_announced: size.is_some(), limit, gone: 0, crc: 0, held: 0, direct: 0 }
     }
 
     /// Number of bytes received.
@@ -248,7 +261,7 @@ impl Sink {
         buffer: &[u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if self.kind != Writable::Stream {
+        if !self.is_stream {
             return Ok(());
         }
         self.crc = self.crc(buffer);
@@ -268,7 +281,7 @@ impl Sink {
 
     /// The download has ended before it was complete.
     pub(super) fn abandon(&self, objects: &mut impl Objects) {
-        if self.kind == Writable::Stream {
+        if self.is_stream {
             objects.abandon(self.at);
         }
     }
@@ -279,13 +292,14 @@ impl Sink {
         objects: &mut impl Objects,
         now: Tick,
     ) -> Result<(), Abort> {
-        if self.announced.is_some_and(|size| size != self.len()) {
+        if self.is_announced && self.len() != self.limit {
             return Err(Abort::TooShort);
         }
         self.hand_over(buffer, objects)?;
-        match self.kind {
-            Writable::Stream => objects.stream(self.at, Part::End(self.gone)),
-            Writable::Value(_) => objects.write(self.at, self.held(buffer), now),
+        if self.is_stream {
+            objects.stream(self.at, Part::End(self.gone))
+        } else {
+            objects.write(self.at, self.held(buffer), now)
         }
     }
 }

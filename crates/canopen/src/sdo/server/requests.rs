@@ -4,7 +4,7 @@ use super::{Answer, Server, Transfer};
 use crate::Tick;
 use crate::sdo::block_download::Receiver;
 use crate::sdo::block_upload::Sender;
-use crate::sdo::objects::{Sink, Source};
+use crate::sdo::objects::{Room, Sink, Source};
 use crate::sdo::segmented::{Download, Upload};
 use crate::sdo::{
     Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE,
@@ -182,7 +182,8 @@ impl<O: Objects> Server<O> {
             Initiate::Expedited(bytes) => bytes,
             Initiate::Unsized(data) => unsized_value(data, at, objects)?,
             Initiate::Segmented(size) => {
-                self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
+                let sink = Sink::new(at, size, Room::of(at, size, objects)?);
+                self.transfer = Transfer::Download(Download::new(sink));
                 return Ok(());
             }
         };
@@ -201,7 +202,7 @@ impl<O: Objects> Server<O> {
 
     fn block_download(&mut self, at: Multiplexer, crc: bool, size: Option<u32>, objects: &mut O) -> Answer {
         self.begin(at, objects);
-        let sink = Sink::open(at, size, objects)?;
+        let sink = Sink::new(at, size, Room::of(at, size, objects)?);
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
