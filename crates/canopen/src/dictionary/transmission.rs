@@ -24,6 +24,7 @@ pub enum Transmission {
 impl Transmission {
     /// `None` for the reserved types 241 to 251.
     #[must_use]
+    #[inline(never)]
     pub const fn parse(value: u8) -> Option<Transmission> {
         match (value, NonZeroU8::new(value)) {
             (1..=240, Some(every)) => Some(Transmission::SyncCyclic(every)),

@@ -82,6 +82,7 @@ impl<L: Array<Watched>> List<L> {
         }
     }
 
+    #[inline(never)]
     fn iter_mut(&mut self) -> core::slice::IterMut<'_, Watched> {
         self.memory.as_mut().get_mut(..self.len).unwrap_or_default().iter_mut()
     }
