@@ -1,5 +1,6 @@
 //! One entry of a dictionary at run time, and the range of its values.
 
+use super::tables::Series;
 use super::{Access, Field, Group, Mapping, Rule, Type};
 use crate::sdo::Abort;
 
@@ -50,6 +51,7 @@ impl Kind {
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     pub(crate) attributes: &'static Attributes,
+    pub(crate) series: &'static Series,
     pub(crate) field: Field,
     pub(crate) sub: u8,
     pub(crate) index: u16,

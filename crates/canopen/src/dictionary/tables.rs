@@ -96,7 +96,7 @@ impl Dictionary {
 
     /// The default value of an entry. Zeros at its end may be missing.
     pub(crate) fn default(&self, entry: &Entry) -> &'static [u8] {
-        let Ok((series, _)) = self.series_of(entry.index, entry.sub) else { return &[] };
+        let series = entry.series;
         let start = entry.field.offset.wrapping_sub(series.offset);
         let defaults = self.defaults_of(series).get(usize::from(start)..).unwrap_or_default();
         defaults.get(..usize::from(entry.field.size)).unwrap_or(defaults)
@@ -148,10 +148,8 @@ impl Dictionary {
 
     /// The entries of an object; none for an unknown index.
     pub(crate) fn object(&self, index: u16) -> impl Iterator<Item = Entry> {
-        let found = self.series_of(index, 0).ok();
-        found.into_iter().flat_map(move |(series, number)| {
-            self.places_of(series).iter().filter_map(move |place| self.entry(series, number, *place))
-        })
+        let places = self.find(index, 0).map_or(&[][..], |entry| self.places_of(entry.series));
+        places.iter().filter_map(move |place| self.find(index, place.sub).ok())
     }
 
     /// The indexes of the objects from `first` on that are below `end`.
@@ -179,12 +177,12 @@ impl Dictionary {
 
     /// The entry at a place of an object of a series.
     #[inline]
-    fn entry(&self, series: &Series, number: u16, place: Place) -> Option<Entry> {
+    fn entry(&self, series: &'static Series, number: u16, place: Place) -> Option<Entry> {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
         let before = if number == 0 { 0 } else { number.wrapping_mul(self.stride(series)) };
         let offset = series.offset.wrapping_add(before).wrapping_add(place.offset);
         let field = Field { offset, size: attributes.size };
-        Some(Entry { attributes, field, sub: place.sub, index: series.index.wrapping_add(number) })
+        Some(Entry { attributes, series, field, sub: place.sub, index: series.index.wrapping_add(number) })
     }
 
     /// Size of an object in the image in bytes.
