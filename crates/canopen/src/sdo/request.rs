@@ -14,7 +14,9 @@ pub struct Multiplexer {
 
 impl Multiplexer {
     pub(crate) const fn parse(frame: &[u8; 8]) -> Multiplexer {
-        Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
+        // From the first word: a response takes the same three bytes back.
+        let head = u32::from_le_bytes([frame[0], frame[1], frame[2], frame[3]]);
+        Multiplexer { index: (head >> 8) as u16, sub: (head >> 24) as u8 }
     }
 
     /// The data of a frame: command specifier, this multiplexer and four bytes.
