@@ -14,8 +14,19 @@ pub struct Multiplexer {
 
 impl Multiplexer {
     pub(crate) const fn parse(frame: &[u8; 8]) -> Multiplexer {
-        // From the first word: a response takes the same three bytes back.
-        let head = u32::from_le_bytes([frame[0], frame[1], frame[2], frame[3]]);
+        Multiplexer::of_head(u32::from_le_bytes([frame[0], frame[1], frame[2], frame[3]]))
+    }
+
+    /// As `parse`, loaded as one word: fewer instructions, but where several requests are told apart, more code.
+    pub(super) const fn parse_word(frame: &[u8; 8]) -> Multiplexer {
+        match frame.first_chunk() {
+            Some(head) => Multiplexer::of_head(u32::from_le_bytes(*head)),
+            None => Multiplexer { index: 0, sub: 0 },
+        }
+    }
+
+    /// From the first word of a frame: a response takes the same three bytes back.
+    const fn of_head(head: u32) -> Multiplexer {
         Multiplexer { index: (head >> 8) as u16, sub: (head >> 24) as u8 }
     }
 

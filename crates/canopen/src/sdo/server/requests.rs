@@ -99,7 +99,7 @@ impl<O: Objects> Server<O> {
     /// Takes the request that begins a download.
     #[inline(never)]
     pub(super) fn initiate_download(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> bool {
-        let at = Multiplexer::parse(frame);
+        let at = Multiplexer::parse_word(frame);
         self.begin(at, objects);
         // Most downloads are expedited: their data is used directly from the frame.
         let result = match Initiate::expedited(frame) {
