@@ -14,6 +14,9 @@ use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
 use canopen::{Application, objects};
 use cortex_m_rt::entry;
 
+/// One loop calls the device, as CANopenNode's example does.
+const HALVES: bool = false;
+
 type Measured = canopen::device!(Keeper, ROWS);
 
 /// An application without behaviour.

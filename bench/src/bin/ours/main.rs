@@ -16,6 +16,9 @@ use canopen::{Application, Condition, Part, Soundness, Stored};
 use cortex_m_rt::entry;
 use dictionary::DICTIONARY;
 
+/// Two tasks call the device, as in the firmware.
+const HALVES: bool = true;
+
 type Measured = canopen::device!(Keeper, dictionary::ROWS);
 
 /// The application: it keeps a domain.

@@ -1,11 +1,12 @@
-//! A device of ours, called as the firmware calls it: one task for process data and one for services, each asks for its
-//! next deadline at its end. The program around it defines `Measured`, `Keeper` and `DICTIONARY`.
+//! A device of ours. With `HALVES`, it is called as the firmware calls it: one task for process data and one for services, each
+//! asks for its next deadline at its end. Without, one loop takes every frame. The program around it defines `Measured`,
+//! `Keeper`, `DICTIONARY` and `HALVES`.
 
 use bench_images::Node;
 use core::hint::black_box;
 use core::mem::MaybeUninit;
 
-use canopen::{Action, BusEvent, CanId, Device, Instant, Next, NodeId};
+use canopen::{Action, BusEvent, CanId, Device, Frame, Instant, Next, NodeId};
 
 use crate::driver::{Driver, Received};
 
@@ -37,21 +38,36 @@ impl Node for Ours {
     }
 
     fn sort(&mut self, Received(frame): &Received, now: u64) {
+        if !crate::HALVES {
+            return self.take(frame, now);
+        }
         let _ = self.device.on_frame(frame, Instant(now), &mut self.driver);
     }
 
     fn process(&mut self, Received(frame): &Received, now: u64) {
+        if !crate::HALVES {
+            return self.take(frame, now);
+        }
         let next = self.device.on_process_frame(frame, Instant(now), &mut self.driver);
         self.alarms[0] = next.process;
     }
 
     fn serve(&mut self, Received(frame): &Received, now: u64) {
+        if !crate::HALVES {
+            return self.take(frame, now);
+        }
         let next = self.device.on_service_frame(frame, Instant(now), &mut self.driver);
         self.alarms[1] = next.services;
     }
 }
 
 impl Ours {
+    #[inline(never)]
+    fn take(&mut self, frame: &Frame, now: u64) {
+        let next = self.device.on_frame(frame, Instant(now), &mut self.driver);
+        self.alarms = [next.process, next.services];
+    }
+
     /// Does what the device leaves to its caller.
     fn fulfil(&mut self, action: Action, now: Instant) -> Next {
         match action {
