@@ -64,6 +64,12 @@ impl Condition {
         Condition { code, register: 0, detail: [0; 5], class: None }
     }
 
+    /// A group whose newest stored values could not be loaded. `in_use` tells the values that are.
+    const fn of_storage(group: Group, in_use: u8) -> Condition {
+        let code = 0x6300 | group.sub() as u16;
+        Condition { code, register: 0, detail: [in_use, 0, 0, 0, 0], class: Some(ErrorClass::DEVICE) }
+    }
+
     /// Applies a sub-index of object 1029h to the condition.
     #[must_use]
     pub const fn of_class(mut self, class: ErrorClass) -> Condition {
@@ -86,8 +92,8 @@ impl ErrorClass {
 }
 
 /// First byte of the error field of an EMCY about stored data: the values that are in use instead.
-const OLDER_HOLDS: u16 = 1;
-const DEFAULTS_HOLD: u16 = 2;
+const OLDER_HOLDS: u8 = 1;
+const DEFAULTS_HOLD: u8 = 2;
 
 /// Bits of the error register: generic error, and communication error.
 const GENERIC: u8 = 1;
@@ -140,51 +146,36 @@ impl Fault {
     /// `conditions` are the conditions of the application.
     #[must_use]
     pub fn condition(self, conditions: &[Condition]) -> Condition {
-        if let Fault::Application(number) = self {
-            return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
-        }
-        let [low, high] = self.detail().to_le_bytes();
-        let class = self.class();
-        let register = if class == Some(ErrorClass::DEVICE) { 0 } else { COMMUNICATION };
-        Condition { code: self.code(), register, detail: [low, high, 0, 0, 0], class }
-    }
-
-    const fn class(self) -> Option<ErrorClass> {
+        const UNKNOWN: &Condition = &Condition::new(0x1000);
         match self {
-            Fault::StoredData(_) | Fault::OlderData(_) => Some(ErrorClass::DEVICE),
-            Fault::Heartbeat(_) | Fault::LifeGuard => Some(ErrorClass::COMMUNICATION),
-            _ => None,
+            Fault::Application(number) => *conditions.get(usize::from(number)).unwrap_or(UNKNOWN),
+            Fault::StoredData(group) => Condition::of_storage(group, DEFAULTS_HOLD),
+            Fault::OlderData(group) => Condition::of_storage(group, OLDER_HOLDS),
+            Fault::Heartbeat(_) | Fault::LifeGuard => {
+                self.of_communication().of_class(ErrorClass::COMMUNICATION)
+            }
+            _ => self.of_communication(),
         }
     }
 
-    /// The emergency error code of a fault that is not one of the application.
-    const fn code(self) -> u16 {
-        match self {
-            Fault::Overrun => 0x8110,
-            Fault::ErrorPassive => 0x8120,
-            Fault::BusOffRecovered => 0x8140,
-            Fault::SyncMissing => 0x8100,
-            Fault::SyncLength => 0x8240,
-            Fault::MpdoNotTaken => 0x8230,
-            Fault::Heartbeat(_) | Fault::LifeGuard => 0x8130,
-            Fault::RpdoTooShort(_) => 0x8210,
-            Fault::RpdoTooLong(_) => 0x8220,
-            Fault::RpdoDeadline(_) => 0x8250,
-            Fault::StoredData(group) | Fault::OlderData(group) => 0x6300 | group.sub() as u16,
-            Fault::Application(_) => 0x1000,
-        }
-    }
-
-    /// The start of the error field: the sub-index of a heartbeat, the number of an RPDO; for stored data, the values
-    /// in use; 0 for other faults.
-    const fn detail(self) -> u16 {
-        match self {
-            Fault::OlderData(_) => OLDER_HOLDS,
-            Fault::StoredData(_) => DEFAULTS_HOLD,
-            Fault::Heartbeat(number) => number as u16 + 1,
-            Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => number,
-            _ => 0,
-        }
+    /// The condition of a communication fault.
+    const fn of_communication(self) -> Condition {
+        let (code, number) = match self {
+            Fault::Overrun => (0x8110, 0),
+            Fault::ErrorPassive => (0x8120, 0),
+            Fault::BusOffRecovered => (0x8140, 0),
+            Fault::SyncMissing => (0x8100, 0),
+            Fault::SyncLength => (0x8240, 0),
+            Fault::MpdoNotTaken => (0x8230, 0),
+            Fault::Heartbeat(number) => (0x8130, number as u16 + 1),
+            Fault::LifeGuard => (0x8130, 0),
+            Fault::RpdoTooShort(number) => (0x8210, number),
+            Fault::RpdoTooLong(number) => (0x8220, number),
+            Fault::RpdoDeadline(number) => (0x8250, number),
+            Fault::StoredData(_) | Fault::OlderData(_) | Fault::Application(_) => (0, 0),
+        };
+        let [low, high] = number.to_le_bytes();
+        Condition { code, register: COMMUNICATION, detail: [low, high, 0, 0, 0], class: None }
     }
 }
 
