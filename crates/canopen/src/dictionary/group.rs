@@ -41,6 +41,21 @@ impl Group {
         Group::Own8,
     ];
 
+    /// The group at a position of [`ALL`](Group::ALL).
+    pub(crate) const fn of(position: usize) -> Option<Group> {
+        Some(match position {
+            0 => Group::Communication,
+            1 => Group::Application,
+            2 => Group::Calibration,
+            3 => Group::Own4,
+            4 => Group::Own5,
+            5 => Group::Own6,
+            6 => Group::Own7,
+            7 => Group::Own8,
+            _ => return None,
+        })
+    }
+
     /// The sub-index of the group in 1010h and 1011h; 0 for the calibration.
     #[must_use]
     pub const fn sub(self) -> u8 {

@@ -6,6 +6,7 @@ use crate::dictionary::Group;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+// First those without a number, in the order of their bits: the compiler then needs no table.
 pub enum Fault {
     /// Received frames were lost (8110h). The fault ends when none was lost for half a second.
     Overrun,
@@ -20,10 +21,10 @@ pub enum Fault {
     /// A multiplexed PDO for this node names an object that does not accept it (8230h). The fault ends half a second after
     /// the last one.
     MpdoNotTaken,
-    /// The heartbeat of a node is missing (8130h). The number is the entry of 1016h, from 0.
-    Heartbeat(u8),
     /// A guarding master has sent no remote frame within the life time (8130h).
     LifeGuard,
+    /// The heartbeat of a node is missing (8130h). The number is the entry of 1016h, from 0.
+    Heartbeat(u8),
     /// The RPDO with this number, 1 to 512, was shorter than its mapping and is not processed (8210h).
     RpdoTooShort(u16),
     /// The RPDO with this number was longer than its mapping (8220h).
@@ -101,28 +102,24 @@ const COMMUNICATION: u8 = 1 << 4;
 
 impl Fault {
     /// The number of faults that can be active only once: those of communication, then those of the storage groups.
-    const SINGLES: usize = Fault::COMMUNICATION.len() + 2 * Group::ALL.len();
-    const COMMUNICATION: [Fault; 7] = [
-        Fault::Overrun,
-        Fault::ErrorPassive,
-        Fault::BusOffRecovered,
-        Fault::SyncMissing,
-        Fault::SyncLength,
-        Fault::MpdoNotTaken,
-        Fault::LifeGuard,
-    ];
+    const SINGLES: usize = 7 + 2 * Group::ALL.len();
     /// The bits of the communication faults.
     const OF_COMMUNICATION: u32 = 0x7F;
 
     /// The fault with this bit.
     fn single(bit: usize) -> Option<Fault> {
-        let group = |at: usize| Group::ALL.get(at & 7).copied();
-        match bit.checked_sub(Fault::COMMUNICATION.len()) {
-            None => Fault::COMMUNICATION.get(bit).copied(),
-            Some(at @ 0..=7) => group(at).map(Fault::StoredData),
-            Some(at @ 8..=15) => group(at).map(Fault::OlderData),
-            _ => None,
-        }
+        Some(match bit {
+            0 => Fault::Overrun,
+            1 => Fault::ErrorPassive,
+            2 => Fault::BusOffRecovered,
+            3 => Fault::SyncMissing,
+            4 => Fault::SyncLength,
+            5 => Fault::MpdoNotTaken,
+            6 => Fault::LifeGuard,
+            7..=14 => Fault::StoredData(Group::of(bit - 7)?),
+            15..=22 => Fault::OlderData(Group::of(bit - 15)?),
+            _ => return None,
+        })
     }
 
     /// The bit of a fault that can be active only once; `None` for a fault with a number.
