@@ -1,6 +1,6 @@
 //! The location of one value in the image of all values.
 
-use crate::sdo::Bytes;
+use crate::copy::copy;
 
 /// Offset and size of a value in the image.
 ///
@@ -150,7 +150,9 @@ access! {
 /// The last bytes of an image, followed by zeros.
 #[inline(never)]
 fn padded(rest: &[u8]) -> [u8; 8] {
-    Bytes::from_slice(rest).padded()
+    let mut bytes = [0; 8];
+    copy(&mut bytes, rest);
+    bytes
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Block upload (CiA 301, 7.2.4.3.13 to 15): the server sends up to 127 segments before it waits for an answer.
 
 use super::objects::{BUFFER, Source};
-use super::{Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Objects, crc};
+use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects, crc};
+use crate::copy::copy;
 
 /// A block upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -166,6 +167,10 @@ impl Sender {
 fn next_segment(content: &[u8]) -> ([u8; 7], &[u8]) {
     match content.split_first_chunk() {
         Some((data, rest)) => (*data, rest),
-        None => (Bytes::from_slice(content).padded(), &[]),
+        None => {
+            let mut data = [0; 7];
+            copy(&mut data, content);
+            (data, &[])
+        }
     }
 }

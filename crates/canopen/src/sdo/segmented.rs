@@ -1,8 +1,9 @@
 //! Segmented transfers (CiA 301, 7.2.4.3.4 and 7.2.4.3.7).
 
 use super::objects::{BUFFER, Sink, Source};
-use super::{Abort, Bytes, Objects, TOGGLE};
+use super::{Abort, Objects, TOGGLE};
 use crate::Tick;
+use crate::copy::copy;
 
 /// An upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +45,7 @@ impl Upload {
         let len = content.len().min(data.len());
         match content.first_chunk() {
             Some(full) => *data = *full,
-            None => *data = Bytes::from_slice(content).padded(),
+            None => copy(data, content),
         }
         self.sent += len;
         self.toggle = !requested;

@@ -178,16 +178,19 @@ impl<O: Objects> Server<O> {
         objects: &mut O,
         now: Tick,
     ) -> Result<(), Abort> {
-        let value = match Initiate::parse(frame) {
-            Initiate::Expedited(bytes) => bytes,
-            Initiate::Unsized(data) => unsized_value(data, at, objects)?,
-            Initiate::Segmented(size) => {
-                let sink = Sink::new(at, size, Room::of(at, size, objects)?);
-                self.transfer = Transfer::Download(Download::new(sink));
-                return Ok(());
-            }
+        let [command, _, _, _, data @ ..] = frame;
+        if command & 2 == 0 {
+            let size = (command & 1 != 0).then(|| u32::from_le_bytes(*data));
+            let sink = Sink::new(at, size, Room::of(at, size, objects)?);
+            self.transfer = Transfer::Download(Download::new(sink));
+            return Ok(());
+        }
+        // Expedited, without a size: the data type tells it.
+        let size = match objects.writable(at)? {
+            Writable::Value(size) => size,
+            Writable::Stream => data.len(),
         };
-        objects.write(at, value.as_slice(), now)
+        objects.write(at, data.get(..size).unwrap_or(data), now)
     }
 
     fn download_segment(&mut self, frame: &[u8; 8], objects: &mut O, now: Tick) -> Answer {
@@ -257,13 +260,5 @@ impl<O: Objects> Server<O> {
             Transfer::BlockUpload(sender) => Ok(sender),
             _ => Err(Abort::Command),
         }
-    }
-}
-
-/// The value of an expedited download without a size. The size is taken from the data type.
-fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
-    match objects.writable(at)? {
-        Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),
-        Writable::Stream => Ok(Bytes::new(data, 4)),
     }
 }
