@@ -142,10 +142,7 @@ impl<D: Definition> Inner<D> {
 
     /// The position of a PDO in the array of the device: its rank among the PDOs of the dictionary in this direction.
     fn place(&self, pdo: Pdo) -> Option<u16> {
-        let is_other = |other: &Pdo| other.communication != pdo.communication;
-        let before = self.pdos(pdo.direction()).take_while(is_other).count();
-        let place = u16::try_from(before).ok()?;
-        self.pdo_at(pdo.direction(), place).map(|_| place)
+        self.dictionary.pdo_place(pdo.communication)
     }
 
     /// The position of a TPDO by its number, 1 to 512.

@@ -95,6 +95,7 @@ impl Dictionary {
     }
 
     /// The default value of an entry. Zeros at its end may be missing.
+    #[inline(never)]
     pub(crate) fn default(&self, entry: &Entry) -> &'static [u8] {
         let series = entry.series;
         let start = entry.field.offset.wrapping_sub(series.offset);
@@ -121,6 +122,19 @@ impl Dictionary {
                 None => return Some(series.index.wrapping_add(rest)),
                 Some(less) => rest = less,
             }
+        }
+        None
+    }
+
+    /// The rank of a PDO, by the index of its communication object: the opposite of [`pdo`](Dictionary::pdo).
+    pub(crate) fn pdo_place(&self, index: u16) -> Option<u16> {
+        let mut before = 0;
+        for series in self.series.iter().filter(|series| (series.index ^ index) & 0xFE00 == 0) {
+            let number = index.wrapping_sub(series.index);
+            if number < series.objects.into() {
+                return Some(before + number);
+            }
+            before += u16::from(series.objects);
         }
         None
     }
