@@ -181,6 +181,13 @@ mod tests {
     }
 
     #[test]
+    fn a_timer_that_is_a_whole_period_late_is_due_a_period_from_now() {
+        let (due, now) = (Tick::since_epoch(1000), Tick::since_epoch(101_000));
+        assert!(due.following(100, now) == now.plus(Span::from_millis(100)));
+        assert!(due.following(101, now) == Tick::since_epoch(102_000));
+    }
+
+    #[test]
     fn a_tick_keeps_its_instant_when_the_epoch_moves() {
         let mut clock = Clock::new();
         let mut due = clock.tick(Instant(20_000_000)).unwrap().plus(Span::from_millis(u16::MAX));

@@ -147,7 +147,8 @@ impl<D: Definition> Inner<D> {
 
     /// The position of a TPDO by its number, 1 to 512.
     pub(super) fn tpdo_place(&self, number: u16) -> Option<u16> {
-        self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
+        let number = number.checked_sub(1).filter(|number| *number < 512)?;
+        self.place(Pdo { communication: 0x1800 | number })
     }
 
     fn configure_one(&mut self, pdo: Pdo, place: u16, now: Tick) {

@@ -111,3 +111,26 @@ fn until_71_minutes_before_the_end_of_64_bits_no_deadline_is_in_the_past() {
     let heartbeats = times(&mut node, (start, end), 0x705);
     assert!(heartbeats.windows(2).all(|pair| pair[1] - pair[0] == SECOND));
 }
+
+#[test]
+fn the_inhibit_time_of_an_emcy_ends_in_time_for_hours() {
+    for pause in [34 * SECOND, HOUR, 100 * 24 * HOUR] {
+        let mut node = operational(0);
+        let ask = |request: Frame| {
+            let mut sent = Sent::default();
+            let _ = node.on_service_frame(&request, Instant(1), &mut sent);
+            sent.0
+        };
+        let at = canopen::sdo::Multiplexer { index: 0x1015, sub: 0 };
+        exchange::write(ID, at, &60_000_u16.to_le_bytes(), ask).unwrap();
+        let _ = node.on_bus(BusEvent::Overrun, Instant(2));
+        times(&mut node, (2, 3), 0x85);
+        times(&mut node, (3, pause), 0x85);
+        let _ = node.on_bus(BusEvent::Overrun, Instant(pause));
+        assert_eq!(
+            times(&mut node, (pause, pause + 7 * SECOND), 0x85),
+            [pause, pause + 6 * SECOND],
+            "{pause}"
+        );
+    }
+}

@@ -293,3 +293,23 @@ fn a_bit_rate_changes_at_once_without_a_delay() {
     bench.take();
     assert!(bench.read(0x1000, 0).is_ok());
 }
+#[test]
+fn a_reserved_mode_changes_no_state() {
+    let mut bench = Bench::booted();
+    configuration(&mut bench, true);
+    bench.receive(Frame::new(0x7E5, &[4, 2, 0, 0, 0, 0, 0, 0]).unwrap());
+    assert_eq!(send(&mut bench, Request::InquireNodeId), Some(Response::NodeIdIs(ID)), "still configured");
+}
+
+#[test]
+fn a_detected_bit_rate_is_stored_with_a_node_id() {
+    let bit_rate = BitRate::from_kbit(50).unwrap();
+    let mut bench = Bench::booted();
+    bench.take_action();
+    bench.device.set_bit_rate(bit_rate);
+    configuration(&mut bench, true);
+    send(&mut bench, Request::NodeId(7));
+    send(&mut bench, Request::Store);
+    let configuration = Configuration { node_id: NodeId::new(7), bit_rate };
+    assert_eq!(bench.take_action(), Some(Action::Store(Job::Configure(configuration))));
+}

@@ -186,6 +186,17 @@ fn a_device_without_pdos_produces_too() {
 }
 
 #[test]
+fn a_device_with_nothing_but_the_time_takes_it() {
+    const ROWS: &[Object] =
+        canopen::rows!([objects::device_type(0), objects::time_stamp()], objects::identity(0, 1, 1));
+    static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+    let mut node: canopen::device!(Log, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Log::default());
+    let _ = node.start(Instant(0), &mut Sent::default());
+    let _ = node.on_process_frame(&Frame::new(0x100, &[0; 6]).unwrap(), Instant(1), &mut Sent::default());
+    assert_eq!(node.application().times.len(), 1);
+}
+
+#[test]
 fn rows_without_these_services_do_not_have_their_code() {
     let of = |rows: &[Object]| Services::of(rows);
     assert!(of(ROWS).contains(Services::SYNC_PRODUCER.with(Services::TIME).with(Services::SYNC)));

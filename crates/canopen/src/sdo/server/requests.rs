@@ -7,8 +7,7 @@ use crate::sdo::block_upload::Sender;
 use crate::sdo::objects::{Room, Sink, Source};
 use crate::sdo::segmented::{Download, Upload};
 use crate::sdo::{
-    Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE,
-    Writable, tail,
+    Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE, Writable, tail,
 };
 
 impl<O: Objects> Server<O> {
@@ -210,7 +209,12 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
-    pub(super) fn take_block_segment(&mut self, frame: &[u8; 8], is_repeated: bool, objects: &mut O) -> Answer {
+    pub(super) fn take_block_segment(
+        &mut self,
+        frame: &[u8; 8],
+        is_repeated: bool,
+        objects: &mut O,
+    ) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         if !receiver.take(frame, is_repeated, &mut self.buffer, objects) {
             return Ok(false);
