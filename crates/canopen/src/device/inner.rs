@@ -253,8 +253,8 @@ impl<D: Definition> Inner<D> {
         if Self::has(Services::EMCY) {
             let _ = self.emcy.configure(self.number_or(0x1014, 0, u32::MAX));
             self.emcy.set_inhibit(low_half(self.number(0x1015, 0)), now);
-            let errors = (1..=emcy::HISTORY).take_while(|&sub| self.dictionary.find(0x1003, sub).is_ok());
-            self.emcy.set_history_depth(errors.last().unwrap_or(0));
+            let depth = self.dictionary.find(0x1003, 0).map_or(0, |count| count.series.entries - 1);
+            self.emcy.set_history_depth(depth.min(emcy::HISTORY));
         }
         if Self::has(Services::HEARTBEAT_CONSUMER) {
             self.configure_watches(now);
