@@ -103,6 +103,8 @@ const COMMUNICATION: u8 = 1 << 4;
 impl Fault {
     /// The number of faults that can be active only once: those of communication, then those of the storage groups.
     const SINGLES: usize = 7 + 2 * Group::ALL.len();
+    /// The number of places for [`FaultSet::at`].
+    pub(crate) const PLACES: usize = Fault::SINGLES + 32;
     /// The bits of the communication faults.
     const OF_COMMUNICATION: u32 = 0x7F;
 
@@ -224,15 +226,14 @@ impl FaultSet {
         self == FaultSet::EMPTY
     }
 
-    /// The active faults, without those of heartbeats and RPDOs.
-    pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
-        (0..Fault::SINGLES + 32).filter_map(move |place| {
-            if let Some(fault) = Fault::single(place) {
-                return (self.single & 1 << place != 0).then_some(fault);
-            }
-            let number = u8::try_from(place - Fault::SINGLES).unwrap_or(u8::MAX);
-            (self.application & application_bit(number) != 0).then_some(Fault::Application(number))
-        })
+    /// The fault at a place, if it is active. Together the places have all faults but those of heartbeats and RPDOs.
+    #[inline(never)]
+    pub(crate) fn at(self, place: usize) -> Option<Fault> {
+        if let Some(fault) = Fault::single(place) {
+            return (self.single & 1 << place != 0).then_some(fault);
+        }
+        let number = place.checked_sub(Fault::SINGLES).and_then(|number| u8::try_from(number).ok())?;
+        (self.application & application_bit(number) != 0).then_some(Fault::Application(number))
     }
 
     /// The value of the error register (1001h).
@@ -266,7 +267,7 @@ mod tests {
         let all = || (0..Fault::SINGLES).filter_map(Fault::single).chain((0..32).map(Fault::Application));
         let mut set = FaultSet::default();
         assert!(all().all(|fault| set.set(fault, true)));
-        assert!(set.singles().eq(all()));
+        assert!((0..Fault::PLACES).filter_map(|place| set.at(place)).eq(all()));
         assert!(all().all(|fault| set.set(fault, false)));
         assert!(set.is_empty());
     }

@@ -123,7 +123,8 @@ impl Producer {
     // Not inlined: two callers, and much code.
     #[inline(never)]
     fn raise_singles(&mut self, details: impl Fn(u8) -> Detail, now: Tick) {
-        for fault in self.active.singles() {
+        for place in 0..Fault::PLACES {
+            let Some(fault) = self.active.at(place) else { continue };
             let detail = if let Fault::Application(number) = fault { details(number) } else { None };
             self.errors |= self.repeat(fault, detail, now);
         }
@@ -159,7 +160,8 @@ impl Producer {
     pub(crate) fn restart_silently(&mut self) {
         self.errors = 0;
         self.active.forget_several();
-        for fault in self.active.singles() {
+        for place in 0..Fault::PLACES {
+            let Some(fault) = self.active.at(place) else { continue };
             self.errors |= self.class_of(fault);
         }
     }
