@@ -186,8 +186,9 @@ impl Links {
     }
 
     /// Puts the PDO at position `place` before the others of the chain.
+    #[allow(clippy::cast_possible_truncation)] // There are at most 512 in each direction.
     pub(crate) fn prepend(&mut self, chain: Chain, place: usize) {
-        let place = u16::try_from(place).unwrap_or(Links::NOWHERE);
+        let place = place as u16;
         match chain {
             Chain::Valid => self.valid = place,
             Chain::Synchronous => self.synchronous = place,
