@@ -188,9 +188,13 @@ impl Producer {
 
     /// The class of an error that has occurred since the last call, if there is one.
     pub(crate) fn take_error(&mut self) -> Option<ErrorClass> {
-        let lowest = self.errors.trailing_zeros();
-        self.errors &= self.errors.saturating_sub(1);
-        u8::try_from(lowest).ok().filter(|sub| *sub < 8).map(ErrorClass)
+        if self.errors == 0 {
+            return None;
+        }
+        #[allow(clippy::cast_possible_truncation)] // Below 8.
+        let lowest = self.errors.trailing_zeros() as u8;
+        self.errors &= self.errors - 1;
+        Some(ErrorClass(lowest))
     }
 
     /// Discards the waiting messages.
