@@ -196,8 +196,28 @@ impl Case {
         if matches!(self.change.0, 0x2200..=0x2201) {
             bench.write(0x2203, 0, b"cali").unwrap();
         }
-        (0..20).for_each(|_| sample(&mut bench));
+        if self.is_filtered() {
+            self.step(&mut bench);
+        } else {
+            (0..20).for_each(|_| sample(&mut bench));
+        }
         bench
+    }
+
+    /// Whether the change is one of the filter, which makes a difference while the filter follows a step.
+    fn is_filtered(&self) -> bool {
+        matches!(self.change.0, 0x2310 | 0x61A0..=0x61A1 | 0x69A0..=0x69A1)
+    }
+
+    /// A step of the inputs that a slow filter has hardly followed. The load has a slow filter by default.
+    fn step(&self, bench: &mut Bench) {
+        if self.personality != Personality::Lift {
+            let (kind, sub) = (self.change.0 & !1, self.change.1);
+            bench.write(kind, sub, &[1]).unwrap();
+            bench.write(kind + 1, sub, &[255]).unwrap();
+        }
+        (0..20).for_each(|_| bench.sample(&raw(100_000.0, 280.0)));
+        (0..OLDER).for_each(|_| sample(bench));
     }
 
     /// The channel that the unit of the lift takes: that of the change.
