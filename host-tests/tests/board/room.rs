@@ -20,6 +20,7 @@ const SAVES_LEFT: (u16, u8) = (0x2010, 1);
 pub(crate) const ERASES: (u16, u8) = (0x2010, 2);
 const PRESET: (u16, u8) = (0x6003, 0);
 const POSITION: (u16, u8) = (0x6004, 0);
+const SENSOR_STATE: (u16, u8) = (0x210B, 1);
 const DEVICE_STATE: u32 = 0x0800_0022;
 pub(crate) const PRE_OPERATIONAL: [u8; 2] = [0x80, 1];
 /// The longest erase of a page, and what the save adds.
@@ -191,6 +192,74 @@ fn no_page_is_erased_while_the_shaft_turns() {
     assert_eq!(read(&mut world, &master, LOST_MILLISECONDS), 0);
     world.run_until(SECOND * 23);
     assert!(read(&mut world, &master, SAVES_LEFT) > 0, "at rest");
+}
+
+/// An SDO request to a node, with its answer within a second.
+fn asked(
+    world: &mut World,
+    master: &Master,
+    node: u8,
+    (index, sub): (u16, u8),
+    command: u8,
+    value: u32,
+) -> [u8; 8] {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+    let answers = 0x580 + u16::from(node);
+    master.heard(world, answers);
+    let start = world.now();
+    master.send(world, 0x600 + u16::from(node), &[command, low, high, sub, a, b, c, d]);
+    while world.now() < start + SECOND {
+        world.run_until(world.now() + Time::from_micros(200));
+        if let Some(answer) = master.heard(world, answers).first() {
+            assert_ne!(answer.bytes()[0], 0x80, "{index:x}h of node {node}: {answer:x?}");
+            return answer.bytes().try_into().expect("eight bytes");
+        }
+    }
+    panic!("no answer of {index:x}h within a second");
+}
+
+/// After an erase, which may end at any phase of a sample, the next sample may follow at once: the word of an SSI sensor
+/// is then still on the line.
+#[test]
+fn an_erase_that_ends_at_any_phase_of_a_sample_is_no_fault_of_the_sensor() {
+    const PHASES: u64 = 36;
+    let nodes = [("encoder", 1, 1000), ("combined", 77, 500), ("lift", 127, 250)];
+    // The budget allows 20 erases.
+    for ((personality, node, bit_rate), first) in nodes.iter().flat_map(|node| [(*node, 0), (*node, 1)]) {
+        let flags = format!("--node {node}:{personality} --bitrate {bit_rate} --shaft const:3.3");
+        let mut world = world(&flags);
+        let master = Master::join_at(&mut world, bit_rate * 1000);
+        world.run_until(SECOND);
+        let erases = |world: &mut World| asked(world, &master, node, ERASES, 0x40, 0)[4];
+        asked(&mut world, &master, node, (0x2100, 1), 0x2F, 2);
+        if personality == "lift" {
+            asked(&mut world, &master, node, (0x2305, 0), 0x2F, 1);
+        }
+        world.run_until(world.now() + Time::from_millis(300));
+        world.take_frames();
+        let (mut number, mut seen) = (0, erases(&mut world));
+        for phase in (first..PHASES).step_by(2) {
+            while erases(&mut world) == seen {
+                number += 1;
+                asked(&mut world, &master, node, APPLICATION, 0x2B, 1000 + number);
+                let millisecond = world.now().as_micros() / 1000 + 6;
+                world.run_until(Time::from_micros(millisecond * 1000 + phase * 1000 / PHASES));
+                asked(&mut world, &master, node, (0x1010, 3), 0x23, SAVE);
+            }
+            seen = erases(&mut world);
+            world.run_until(world.now() + Time::from_millis(20));
+            let emcy = frame(0x80 + u16::from(node), &[]).id();
+            let emcys = world.take_frames().into_iter().filter(|sent| sent.frame.id() == emcy).count();
+            assert_eq!(emcys, 0, "{personality}, phase {phase}");
+            let state = if personality == "lift" { (0x2303, 1) } else { SENSOR_STATE };
+            assert_eq!(
+                asked(&mut world, &master, node, state, 0x40, 0)[4],
+                0,
+                "{personality}, phase {phase}"
+            );
+        }
+        println!("{personality}: {seen} erases in {number} saves");
+    }
 }
 
 /// With a short heartbeat time, an erase would be a missing heartbeat.

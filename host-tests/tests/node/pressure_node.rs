@@ -375,6 +375,59 @@ fn lowest_and_highest_value_are_kept_until_they_are_restarted() {
     assert!(real(&mut bench, 0x2211, 1) >= 4.0, "another unit begins anew");
 }
 
+/// 2211h and 2212h of a channel.
+fn extremes_of(bench: &mut Bench, sub: u8) -> [f32; 2] {
+    [0x2211, 0x2212].map(|index| real(bench, index, sub).round())
+}
+
+/// A restart, and a write to a parameter of a process value, concern the channels that they name: the other one keeps its
+/// extremes.
+#[test]
+fn a_restart_of_the_extremes_of_one_channel_keeps_those_of_the_other_one() {
+    let real = |value: f32| value.to_le_bytes().to_vec();
+    for (personality, shift, id) in
+        [(Personality::Pressure, 0, 1), (Personality::Combined, 0x800, 77), (Personality::Pressure, 0, 127)]
+    {
+        let mut writes = vec![
+            (0x2213, 0, vec![0], [true, true]),
+            (0x2213, 0, vec![1], [false, true]),
+            (0x2213, 0, vec![2], [true, false]),
+            (0x2213, 0, vec![3], [false, false]),
+        ];
+        for (sub, kept) in [(1, [false, true]), (2, [true, false])] {
+            writes.extend([
+                (0x6124 + shift, sub, real(0.0), kept),
+                (0x6126 + shift, sub, real(1.0), kept),
+                (0x6127 + shift, sub, real(0.0), kept),
+                (0x2210, sub, real(0.0), kept),
+                (0x6125 + shift, sub, b"zero".to_vec(), kept),
+                (0x6139 + shift, sub, b"tare".to_vec(), kept),
+            ]);
+        }
+        writes.push((0x6131 + shift, 1, 0x004E_0000_u32.to_le_bytes().to_vec(), [false, true]));
+        writes.push((0x6131 + shift, 2, 0x002D_0000_u32.to_le_bytes().to_vec(), [true, false]));
+        for (index, sub, bytes, kept) in writes {
+            let mut bench = Bench::booted_at(personality, id);
+            for (bar, kelvin) in [(3.0, 298.15), (5.0, 330.15), (3.0, 298.15), (2.0, 290.15), (3.0, 298.15)] {
+                (0..5).for_each(|_| bench.sample(&raw(bar * 1e5, kelvin)));
+            }
+            let before = [1, 2].map(|sub| extremes_of(&mut bench, sub));
+            assert!(before.iter().all(|[low, high]| low < high), "{before:?}");
+            bench.write(index, sub, &bytes).unwrap();
+            (0..10).for_each(|_| bench.sample(&raw(3e5, 298.15)));
+            for (channel, (before, kept)) in (1..).zip(before.into_iter().zip(kept)) {
+                let after = extremes_of(&mut bench, channel);
+                let name = format!("{personality:?}, {index:X}h:{sub} = {bytes:?}, channel {channel}");
+                if kept {
+                    assert_eq!(after, before, "{name}");
+                } else {
+                    assert_eq!(after[0], after[1], "{name}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn an_alarm_has_a_hysteresis_and_a_latched_alarm_stays_until_its_reset() {
     let mut bench = Bench::booted();

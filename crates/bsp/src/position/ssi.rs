@@ -17,6 +17,11 @@
 //! One reading is lost. A word that is incomplete a millisecond after its start will never be complete: it is counted
 //! ([`Event::SsiWord`]), both streams and the SPI are set up again, and the next word is started in the same
 //! millisecond. A surplus byte has the same effect, because it would be taken for the first byte of the next word.
+//!
+//! # Effect of a late call
+//!
+//! When the core was stopped, a call comes late and the next one may follow at once. The word that is still on the line
+//! then is left alone, and the call after that fetches it.
 #![expect(unsafe_code, reason = "registers, and the buffers of DMA")]
 
 use core::sync::atomic::{AtomicU8, Ordering};
@@ -68,6 +73,8 @@ pub struct Ssi {
     send: Stream4<DMA1>,
     /// Number of bytes of the started word; 0 without one.
     started: usize,
+    /// The last call has left the word on the line. The next one does not: an SPI that never stops is set up again.
+    is_left: bool,
     losses: &'static Losses,
     _pins: (PB13<Alternate<5>>, PB14<Alternate<5>>),
 }
@@ -87,7 +94,7 @@ impl Ssi {
         SPI2::enable(rcc);
         SPI2::reset(rcc);
         let pins = (clock.into_alternate().speed(CLOCK_SPEED), data.into_alternate());
-        let mut ssi = Ssi { spi, receive, send, started: 0, losses, _pins: pins };
+        let mut ssi = Ssi { spi, receive, send, started: 0, is_left: false, losses, _pins: pins };
         ssi.set_up();
         ssi
     }
@@ -95,6 +102,10 @@ impl Ssi {
     /// To be called once a millisecond: returns the last word, and starts to clock in the next word of `length` bits,
     /// 62 at most; `None` starts nothing. There is no word if none was started, or if the word is incomplete.
     pub fn read(&mut self, length: Option<u32>) -> Option<SsiWord> {
+        self.is_left = self.started > 0 && self.is_on_line() && !self.is_left;
+        if self.is_left {
+            return None;
+        }
         let started = core::mem::take(&mut self.started);
         let word = (started > 0 && self.is_whole()).then(|| received(started));
         if started > 0 && word.is_none() {
@@ -115,9 +126,14 @@ impl Ssi {
         self.receive.is_transfer_complete() && is_at_rest
     }
 
+    /// Whether the SPI clocks.
+    fn is_on_line(&self) -> bool {
+        self.spi.sr().read().bsy().bit_is_set()
+    }
+
     /// Starts a word, unless one is still on the line: the encoder would take the new clocks for that one.
     fn start(&mut self, length: u32) {
-        if self.spi.sr().read().bsy().bit_is_set() {
+        if self.is_on_line() {
             return;
         }
         self.started = bytes(length);

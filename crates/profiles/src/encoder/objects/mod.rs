@@ -64,6 +64,8 @@ pub const fn handles(index: u16, sub: u8) -> bool {
 pub struct Objects {
     fields: &'static Fields,
     reports: [Reports; 2],
+    /// Samples from before the last write to a description of the sensors. The channels share one SSI word.
+    older: OlderSamples,
 }
 
 impl Profile for Objects {
@@ -71,7 +73,7 @@ impl Profile for Objects {
     type Fields = Fields;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, reports: [Reports::NEW; 2] }
+        Objects { fields, reports: [Reports::NEW; 2], older: OlderSamples::NONE }
     }
 
     fn initialise(&mut self, image: &mut [u8], defaults: Groups) {
@@ -83,6 +85,7 @@ impl Profile for Objects {
     }
 
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
+        self.older.take();
         self.fields.publish(snapshot, image);
         for (channel, reports) in self.fields.channels.iter().zip(&mut self.reports) {
             channel.report(snapshot.digital, reports, image);
@@ -112,12 +115,10 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        if let Some(reports) = self.reports.get_mut(usize::from(entry.sub().max(1) - 1)) {
-            match entry.index() {
-                0x2100..=0x2103 => reports.older = OlderSamples::BEGIN,
-                0x6003 | 0x6010 if reports.older.are_left() => return Err(Abort::DeviceState),
-                _ => {}
-            }
+        match entry.index() {
+            0x2100..=0x2103 => self.older = OlderSamples::BEGIN,
+            0x6003 | 0x6010 if self.older.are_left() => return Err(Abort::DeviceState),
+            _ => {}
         }
         self.fields.write(entry, bytes, image)
     }

@@ -6,7 +6,6 @@ use crate::encoder::{
     Area, Cam, Cams, ChannelParameters, ChannelValues, Command, LongSpeed, Module, Parameters, Snapshot,
 };
 use crate::last_sent::LastSent;
-use crate::older_samples::OlderSamples;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::NonZeroU16;
 
@@ -168,8 +167,6 @@ impl Channel {
 pub(super) struct Reports {
     /// The position when each TPDO was sent.
     pub(super) sent: LastSent,
-    /// Samples from before the last write to the description of the sensor.
-    pub(super) older: OlderSamples,
     /// The preset input was off.
     was_off: bool,
     /// The preset input has gone on.
@@ -177,14 +174,12 @@ pub(super) struct Reports {
 }
 
 impl Reports {
-    pub(super) const NEW: Reports =
-        Reports { sent: LastSent::NEW, older: OlderSamples::NONE, was_off: false, has_preset: false };
+    pub(super) const NEW: Reports = Reports { sent: LastSent::NEW, was_off: false, has_preset: false };
 }
 
 impl Channel {
     /// Takes the values of a millisecond.
     pub(super) fn report(&self, digital: [bool; DIGITAL_INPUTS], reports: &mut Reports, image: &[u8]) {
-        reports.older.take();
         let input = usize::from(self.preset_input.u8(image));
         let is_on = input.checked_sub(1).and_then(|input| digital.get(input)).is_none_or(|is_on| *is_on);
         reports.has_preset |= is_on && reports.was_off && input > 0;

@@ -69,8 +69,9 @@ pub struct Objects {
     fields: &'static Fields,
     calls: Calls,
     lamps: panel::LampStates,
-    /// Samples from before the last write to a parameter of position or load.
-    older: OlderSamples,
+    /// Samples from before the last write to a parameter of the positions, and to one of the load.
+    older_positions: OlderSamples,
+    older_loads: OlderSamples,
 }
 
 /// TPDO of the virtual inputs; `OUTPUTS` is the RPDO of the virtual outputs.
@@ -88,7 +89,8 @@ impl Profile for Objects {
             fields,
             calls: Calls::default(),
             lamps: panel::LampStates::default(),
-            older: OlderSamples::NONE,
+            older_positions: OlderSamples::NONE,
+            older_loads: OlderSamples::NONE,
         }
     }
 
@@ -104,7 +106,8 @@ impl Profile for Objects {
         self.fields.publish(snapshot, image);
         self.calls.observe(snapshot.buttons);
         self.lamps.milliseconds = self.lamps.milliseconds.wrapping_add(1);
-        self.older.take();
+        self.older_positions.take();
+        self.older_loads.take();
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {
@@ -112,7 +115,13 @@ impl Profile for Objects {
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        if self.older.are_left() && matches!(entry.index(), 0x6382 | 0x6486) {
+        let older = match entry.index() {
+            0x6380 if bytes != entry.field().get(image) => self.older_positions,
+            0x6382 => self.older_positions,
+            0x6486 => self.older_loads,
+            _ => OlderSamples::NONE,
+        };
+        if older.are_left() {
             return Err(Abort::DeviceState);
         }
         self.fields.write(entry, bytes, image)
@@ -141,9 +150,10 @@ impl Profile for Objects {
     }
 
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
-        if matches!(entry.index(), 0x2100..=0x2103 | 0x2200..=0x2202 | 0x2300..=0x2301 | 0x2311..=0x2312 | 0x6384)
-        {
-            self.older = OlderSamples::BEGIN;
+        match entry.index() {
+            0x2100..=0x2103 | 0x2300..=0x2302 | 0x6384 => self.older_positions = OlderSamples::BEGIN,
+            0x2200..=0x2202 | 0x2310..=0x2312 => self.older_loads = OlderSamples::BEGIN,
+            _ => {}
         }
         match (entry.index(), entry.sub()) {
             (0x6011, 0) => self.follow_output(image),

@@ -158,8 +158,6 @@ pub(super) struct States {
     /// The alarms whose value is beyond its limit, and those that have not been reset: one bit each.
     on: u8,
     latched: u8,
-    /// Samples from before the last restart of the extremes.
-    older: OlderSamples,
     pub(super) channels: [ChannelState; 2],
 }
 
@@ -169,20 +167,22 @@ pub(super) struct ChannelState {
     pub(super) sent: LastSent,
     /// Lowest and highest value.
     extremes: Option<(f32, f32)>,
+    /// Samples from before the last restart of the extremes.
+    older: OlderSamples,
 }
 
 impl States {
     pub(super) const NEW: States = {
-        const CHANNEL: ChannelState = ChannelState { sent: LastSent::NEW, extremes: None };
-        States { on: 0, latched: 0, older: OlderSamples::NONE, channels: [CHANNEL; 2] }
+        const CHANNEL: ChannelState =
+            ChannelState { sent: LastSent::NEW, extremes: None, older: OlderSamples::NONE };
+        States { on: 0, latched: 0, channels: [CHANNEL; 2] }
     };
 
     /// Forgets the extremes of these channels, one bit each.
     fn restart(&mut self, channels: u8) {
-        self.older = OlderSamples::BEGIN;
         for (channel, bit) in self.channels.iter_mut().zip([1, 2]) {
             if channels & bit != 0 {
-                channel.extremes = None;
+                (channel.extremes, channel.older) = (None, OlderSamples::BEGIN);
             }
         }
     }
@@ -228,16 +228,15 @@ impl Functions {
                 channel.extremes = Some((low.min(value), high.max(value)));
             }
         }
-        let is_older = states.older.are_left();
-        states.older.take();
         let places = self.lowest.iter().zip(&self.highest);
         for (channel, (lowest, highest)) in states.channels.iter_mut().zip(places) {
             let (low, high) = channel.extremes.unwrap_or_default();
             lowest.store(image, low.to_le_bytes());
             highest.store(image, high.to_le_bytes());
-            if is_older {
+            if channel.older.are_left() {
                 channel.extremes = None;
             }
+            channel.older.take();
         }
         self.follow_alarms(values, states, image);
     }

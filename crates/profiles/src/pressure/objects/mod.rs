@@ -108,7 +108,7 @@ impl Profile for Objects {
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         let index = entry.index();
         let index = if index < 0x6000 { index } else { index.wrapping_sub(self.fields.shift) };
-        if matches!(index, 0x6110..=0x6123 | 0x6126..=0x6131 | 0x2200..=0x2202) {
+        if matches!(index, 0x6110..=0x6123 | 0x6126..=0x6131 | 0x61A0..=0x61A1 | 0x2200..=0x2202) {
             (self.measured, self.older) = ([None; 2], OlderSamples::BEGIN);
         }
         let value = entry.field().u8(image);
