@@ -25,6 +25,9 @@ class Commissioning {
     this.content = el("div", {}, el("div", { class: "bar" }, nodeChoice(bus)), this.error, this.hint, ...this.panels.map(([, panel]) => panel.element), this.mapping.element, lss(bus));
     bus.on("chosen", () => this.isShown && this.show());
     bus.on("connected", () => this.isShown && this.show());
+    // A node has no personality before it is identified, and may have another one after a restart.
+    let personality = null;
+    bus.on("nodes", () => personality !== (personality = bus.node()?.personality) && this.isShown && this.show());
     bus.connection.on("mapping", ({ node }) => node === bus.chosen && this.isShown && this.mapping.refresh().catch((error) => text(this.error, error.message)));
   }
 

@@ -85,7 +85,7 @@ impl Pump {
     }
 
     /// Notes a node whose PDO parameters are written, by this program or by another master.
-    fn note_remapped(&mut self, node: NodeId, t: f64) {
+    pub(super) fn note_remapped(&mut self, node: NodeId, t: f64) {
         match self.remapped.iter_mut().find(|(other, _)| *other == node) {
             Some((_, since)) => *since = t,
             None => self.remapped.push((node, t)),

@@ -129,8 +129,14 @@ impl Pump {
                 let kind = (identity.vendor, identity.product);
                 let catalogue = Arc::clone(self.catalogues.entry(kind).or_insert(catalogue));
                 self.tracer.know(node, &catalogue);
+                let t = self.now();
                 let entry = self.nodes.change(node);
+                let is_other = entry.catalogue.as_ref().is_some_and(|known| !Arc::ptr_eq(known, &catalogue));
                 (entry.identity, entry.catalogue) = (Some(identity), Some(catalogue));
+                if is_other {
+                    // The node has another data sheet than its survey.
+                    self.note_remapped(node, t);
+                }
             }
             Learned::Channel(channel) => {
                 let additional = Some(channel).filter(|channel| *channel != Channel::default_of(node));
