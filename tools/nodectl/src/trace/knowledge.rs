@@ -97,7 +97,8 @@ impl Knowledge {
 
     /// The quantity of an object by the numbers of the node; `None` while the node has not told them.
     pub(crate) fn measured(&self, of: Multiplexer) -> Option<Quantity> {
-        Quantity::by(&self.catalogue, of, |at| if self.is_asked(at) { Ok(self.told(at)) } else { Err(()) }).ok()
+        Quantity::by(&self.catalogue, of, |at| if self.is_asked(at) { Ok(self.told(at)) } else { Err(()) })
+            .ok()
     }
 
     /// The objects that the quantity of an object depends on and that the node has not told.

@@ -53,8 +53,7 @@ impl Station for Shared {
     }
 }
 
-const DEVICE_TYPE: [[u8; 8]; 2] =
-    [[0x40, 0x00, 0x10, 0, 0, 0, 0, 0], [0x43, 0x00, 0x10, 0, 0x94, 1, 2, 0]];
+const DEVICE_TYPE: [[u8; 8]; 2] = [[0x40, 0x00, 0x10, 0, 0, 0, 0, 0], [0x43, 0x00, 0x10, 0, 0x94, 1, 2, 0]];
 const HEARTBEAT: [[u8; 8]; 2] = [[0x40, 0x17, 0x10, 0, 0, 0, 0, 0], [0x4B, 0x17, 0x10, 0, 0xE8, 3, 0, 0]];
 
 fn shared(pause: u64) -> Wire<Shared> {
@@ -84,10 +83,10 @@ fn a_request_waits_for_the_transfer_of_another_client() {
 /// The answers to another client are no answers to the scan.
 #[test]
 fn a_scan_and_a_trace_beside_another_client_know_the_node() {
-    for (pause, transfer) in [200, 100, 50, 20].into_iter().zip([HEARTBEAT, DEVICE_TYPE].into_iter().cycle()) {
+    for (pause, transfer) in [200, 100, 50, 20].into_iter().zip([HEARTBEAT, DEVICE_TYPE].into_iter().cycle())
+    {
         let wire = shared_by(pause, transfer);
-        let found =
-            nodectl::scan::scan(&mut wire.network(), Duration::from_millis(300)).expect("a bus");
+        let found = nodectl::scan::scan(&mut wire.network(), Duration::from_millis(300)).expect("a bus");
         let presence = found.get(&canopen::NodeId::new(1).expect("a node-ID")).expect("the node");
         assert_eq!(presence.device_type, Some(0x0002_0194), "pause of {pause} ms");
         printed(&wire, &["nmt", "start"]);
