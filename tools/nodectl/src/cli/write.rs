@@ -74,12 +74,15 @@ impl Write {
         }
         let text = self.value.as_deref().unwrap_or_default();
         let data_type = data_type.ok_or_else(|| {
-            Failure::Usage(format!("no data sheet states the type of {}: give it with --type", Place(at)))
+            let missing = catalogue.missing(at);
+            let is_known = missing.starts_with("the data sheet");
+            let hint = if is_known { "" } else { ": give it with --type" };
+            Failure::Usage(format!("{missing}{hint}"))
         })?;
         let word = catalogue.word(at, text);
         match word.map_or_else(|| self.parse(text, data_type, quantity), Ok) {
             Ok(value) => Ok(value.encode(data_type)),
-            Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
+            Err(error) => Err(Failure::Usage(format!("{}: {error}{}", Place(at), catalogue.words(at)))),
         }
     }
 

@@ -26,7 +26,7 @@ use self::target::{Target, is_standard};
 use super::source::Source;
 use super::{Failure, Session};
 use crate::acquisition::{Acquisition, Sample, Signal};
-use crate::text::note;
+use crate::text::{counted, note};
 
 /// The longest wait for a value, after which the end of the recording is checked.
 const WAKE: Duration = Duration::from_millis(50);
@@ -104,7 +104,7 @@ impl Record {
     fn tell(&self, rows: usize) {
         let is_file = |path: &&PathBuf| !is_standard(path);
         let tables = self.csv.iter().chain(&self.arrow).filter(is_file);
-        let tables = tables.map(|path| format!("{rows} rows in {}", path.display()));
+        let tables = tables.map(|path| format!("{} in {}", counted(rows, "row", "rows"), path.display()));
         let svg = self.svg.iter().filter(is_file).map(|path| format!("a plot in {}", path.display()));
         let written: Vec<String> = tables.chain(svg).collect();
         if !written.is_empty() {
