@@ -293,8 +293,8 @@ impl<D: Definition> Inner<D> {
         self.application.loaded(group, soundness == Soundness::Whole);
     }
 
-    /// Reports groups that could not be loaded, by EMCY.
-    pub(super) fn report_stored(&mut self, now: Tick) {
+    /// Sets the faults of the groups that could not be loaded, and clears those of all others.
+    pub(super) fn set_stored(&mut self, now: Tick) {
         let groups = if Self::has(Services::OWN_GROUPS) { &Group::ALL[..] } else { &Group::COMMON[..] };
         for &group in groups {
             let soundness = self.damage.of(group);

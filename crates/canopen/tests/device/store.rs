@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, DICTIONARY, ID};
 use canopen::dictionary::{Access, Group, Groups, Object, Type, is_packed, packed_size};
+use canopen::nmt::State;
 use canopen::sdo::Abort;
 use canopen::{Action, Job, NodeId};
 
@@ -258,8 +259,8 @@ fn unfitting_stored_values_are_refused_as_a_whole_and_reported() {
         bench.device.application_mut().stored[0].clear();
         bench.nmt(RESET_COMMUNICATION);
         bench.start();
-        let emcy = bench.sent().into_iter().rfind(|(id, _)| *id == 0x085).expect("an EMCY");
-        assert_eq!(emcy.1[..2], [0, 0]);
+        assert!(bench.sent().iter().all(|(id, _)| *id != 0x085), "no fault is left");
+        assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
     }
 }
 
@@ -306,4 +307,29 @@ fn a_setting_is_stored_at_once_and_shown_by_the_application() {
     assert_eq!(bench.read(0x5F00, 0), Ok(vec![0]), "it is not stored yet");
     assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "asked again");
     assert_eq!(finish(&mut bench, Ok(())), [0x60, 0, 0x5F, 0, 0, 0, 0, 0]);
+}
+
+/// The groups are loaded before the active faults are reported again.
+#[test]
+fn a_repaired_group_is_not_reported_at_the_next_reset() {
+    for (command, is_lost) in
+        [(RESET_COMMUNICATION, true), (RESET_COMMUNICATION, false), (RESET_NODE, true), (RESET_NODE, false)]
+    {
+        let mut bench = Bench::booted();
+        let application = bench.device.application_mut();
+        application.is_damaged = !is_lost;
+        application.stored[0] = if is_lost { vec![1, 2, 3] } else { vec![] };
+        bench.nmt(command);
+        bench.start();
+        assert!(bench.sent().iter().any(|(id, data)| *id == 0x085 && data[..2] == [0x02, 0x63]));
+        bench.write(0x1029, 2, &[2]).unwrap();
+        bench.write(0x1017, 0, &[0, 0]).unwrap();
+        save(&mut bench);
+        bench.device.application_mut().is_damaged = false;
+        bench.nmt(command);
+        bench.start();
+        assert_eq!(bench.sent(), [(0x705, vec![0])], "the boot-up message alone");
+        assert_eq!(bench.device.state(), State::PreOperational, "no error for 1029h");
+        assert_eq!((bench.read(0x1001, 0), bench.read(0x1003, 0)), (Ok(vec![0]), Ok(vec![0])));
+    }
 }
