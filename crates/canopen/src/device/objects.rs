@@ -239,7 +239,9 @@ impl<D: Definition> Inner<D> {
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => {
                 self.configure_watch(entry.sub(), now);
             }
-            Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => self.restart_scanner(),
+            Rule::ScannerCount | Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => {
+                self.restart_scanner();
+            }
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType
