@@ -226,10 +226,10 @@ impl<D: Definition> Inner<D> {
 
     /// Sets objects to their values after a reset: all objects, or the communication objects only.
     pub(super) fn load_values(&mut self, everything: bool) {
-        if !Self::has(Services::FAULTS) {
-            return self.dictionary.load_defaults(self.image.as_mut());
-        }
         self.load_defaults(if everything { Scope::Everything } else { Scope::Communication });
+        if !Self::has(Services::FAULTS) {
+            return;
+        }
         self.load_stored(Group::Communication);
         if everything {
             self.load_stored(Group::Application);
