@@ -3,7 +3,7 @@
 use crate::bench::{Bench, DICTIONARY, ID};
 use canopen::dictionary::{Access, Group, Groups, Object, Type, is_packed, packed_size};
 use canopen::nmt::State;
-use canopen::sdo::Abort;
+use canopen::sdo::{Abort, Multiplexer, Request};
 use canopen::{Action, Job, NodeId};
 
 const SAVE: [u8; 4] = *b"save";
@@ -133,13 +133,25 @@ fn the_client_can_do_something_else_meanwhile() {
     assert_eq!(bench.read(0x1000, 0), Ok(vec![0x94, 1, 2, 0]));
 }
 
+/// The client waits for the server: the time-out is the client's.
 #[test]
-fn a_silent_memory_times_out() {
+fn a_slow_memory_does_not_time_out() {
     let mut bench = Bench::booted();
     begin(&mut bench, 0x1010, 1, SAVE);
-    bench.run(canopen::Duration::from_millis(1100));
-    let aborts = bench.sent().into_iter().filter(|(id, _)| *id == 0x585);
-    assert_eq!(aborts.map(|(_, data)| data[4..8].to_vec()).collect::<Vec<_>>(), [[0, 0, 4, 5]]);
+    bench.run(canopen::Duration::from_millis(5000));
+    assert!(bench.sent().iter().all(|(id, _)| *id != 0x585), "no response before the end of the job");
+    assert_eq!(finish(&mut bench, Ok(())), [0x60, 0x10, 0x10, 1, 0, 0, 0, 0]);
+}
+
+#[test]
+fn a_client_that_has_aborted_gets_no_response_of_its_job() {
+    let mut bench = Bench::booted();
+    begin(&mut bench, 0x1010, 1, SAVE);
+    bench.run(canopen::Duration::from_millis(5000));
+    assert_eq!(bench.ask(Request::Abort(Multiplexer { index: 0x1010, sub: 1 }, 0x0504_0000)), None);
+    bench.take();
+    bench.finish(Ok(()));
+    assert_eq!(bench.sent(), []);
 }
 
 #[test]
