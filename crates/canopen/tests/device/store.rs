@@ -345,3 +345,21 @@ fn a_repaired_group_is_not_reported_at_the_next_reset() {
         assert_eq!((bench.read(0x1001, 0), bench.read(0x1003, 0)), (Ok(vec![0]), Ok(vec![0])));
     }
 }
+
+#[test]
+fn a_value_beyond_its_limits_is_stored_as_its_default() {
+    let mut bench = Bench::booted();
+    bench.write(0x6103, 0, b"kept").unwrap();
+    bench.device.show(|_, image| {
+        DICTIONARY.field(0x6100, 0).set_i16(image, 300);
+        DICTIONARY.field(0x6101, 0).set_f32(image, f32::NAN);
+        DICTIONARY.field(0x1029, 1).set_u8(image, 255);
+    });
+    save(&mut bench);
+    bench.device.application_mut().loaded.clear();
+    reset(&mut bench, RESET_NODE);
+    assert_eq!(bench.device.application().loaded.iter().find(|(_, good)| !good), None);
+    assert_eq!(bench.read(0x6103, 0), Ok(b"kept".to_vec()));
+    assert_eq!((bench.read(0x6100, 0), bench.read(0x6101, 0)), (Ok(vec![0, 0]), Ok(vec![0; 4])));
+    assert_eq!(bench.read(0x1029, 1), Ok(vec![0]));
+}
