@@ -7,8 +7,7 @@ use crate::sdo::block_upload::Sender;
 use crate::sdo::objects::{Room, Sink, Source};
 use crate::sdo::segmented::{Download, Upload};
 use crate::sdo::{
-    Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE,
-    Writable, tail,
+    Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Objects, Response, TOGGLE, Writable, tail,
 };
 
 impl<O: Objects> Server<O> {
@@ -138,9 +137,10 @@ impl<O: Objects> Server<O> {
         Ok(self.upload_value(at, value))
     }
 
-    /// Begins the upload of a value that has been read.
+    /// Begins the upload of a value that has been read. One to four bytes are in the response itself, which cannot be
+    /// empty.
     fn upload_value(&mut self, at: Multiplexer, value: &[u8]) -> bool {
-        if value.len() <= 4 {
+        if matches!(value.len(), 1..=4) {
             return self.set_reply(Response::Uploaded(at, Bytes::from_slice(value)));
         }
         let source = Source::new(at, value, &mut self.buffer);
@@ -148,7 +148,7 @@ impl<O: Objects> Server<O> {
         self.set_reply(Response::UploadSegmented(at, Some(source.size())))
     }
 
-    /// Begins an upload in parts, in segments. One to four bytes are in the response itself, which cannot be empty.
+    /// Begins an upload in parts, in segments, as [`upload_value`](Server::upload_value).
     fn upload_parts(&mut self, mut source: Source, at: Multiplexer, objects: &mut O) -> Answer {
         if matches!(source.len(), 1..=4) {
             let piece = source.piece(0, &mut self.buffer, objects);
@@ -207,7 +207,12 @@ impl<O: Objects> Server<O> {
         Ok(self.set_reply(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
-    pub(super) fn take_block_segment(&mut self, frame: &[u8; 8], is_repeated: bool, objects: &mut O) -> Answer {
+    pub(super) fn take_block_segment(
+        &mut self,
+        frame: &[u8; 8],
+        is_repeated: bool,
+        objects: &mut O,
+    ) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
         if !receiver.take(frame, is_repeated, &mut self.buffer, objects) {
             return Ok(false);
@@ -231,7 +236,7 @@ impl<O: Objects> Server<O> {
             let size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
             if let Some(len) = objects.open(at)? {
                 let source = Source::in_parts(at, len);
-                return if len <= usize::from(threshold) {
+                return if is_short(len, threshold) {
                     self.upload_parts(source, at, objects)
                 } else {
                     Ok(self.send_blocks(at, source, size))
@@ -239,7 +244,7 @@ impl<O: Objects> Server<O> {
             }
         }
         let value = objects.read(at)?;
-        if value.len() <= usize::from(threshold) {
+        if is_short(value.len(), threshold) {
             return Ok(self.upload_value(at, value));
         }
         let source = Source::new(at, value, &mut self.buffer);
@@ -258,6 +263,11 @@ impl<O: Objects> Server<O> {
             _ => Err(Abort::Command),
         }
     }
+}
+
+/// Whether an upload of `len` bytes changes from blocks to segments; never with the threshold 0.
+fn is_short(len: usize, threshold: u8) -> bool {
+    threshold != 0 && len <= usize::from(threshold)
 }
 
 /// The value of an expedited download without a size. The size is taken from the data type.
