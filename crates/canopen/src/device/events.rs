@@ -53,6 +53,9 @@ impl<D: Definition> Inner<D> {
             if let Some(number) = tpdo.asks_with_sync() {
                 let is_event = self.application.next_event(number, self.image.as_mut());
                 tpdo.take_event(is_event, self.image.as_ref(), context);
+                if tpdo.is_pending() {
+                    self.process_due = STALE;
+                }
             }
         }
     }

@@ -63,12 +63,30 @@ impl<D: Definition> Choices for Inner<D> {
 }
 
 impl<D: Definition> Inner<D> {
+    /// The active faults of the application are a set of 32 bits.
+    ///
+    /// ```compile_fail
+    /// struct Plant;
+    ///
+    /// impl canopen::Application for Plant {
+    ///     const CONDITIONS: &'static [canopen::Condition] = &[canopen::Condition::new(0x1000); 33];
+    /// }
+    ///
+    /// const ROWS: &[canopen::dictionary::Object] = &[canopen::objects::device_type(0)];
+    /// static DICTIONARY: canopen::dictionary::Dictionary = canopen::dictionary!(ROWS);
+    ///
+    /// let _: canopen::device!(Plant, ROWS) = canopen::Device::new(&DICTIONARY, None, Plant);
+    /// ```
+    const CONDITIONS_FIT: () =
+        assert!(D::Application::CONDITIONS.len() <= 32, "an application has at most 32 conditions");
+
     /// A device that has not started.
     pub(super) fn new(
         dictionary: &'static Dictionary,
         node_id: Option<NodeId>,
         application: D::Application,
     ) -> Inner<D> {
+        let () = Self::CONDITIONS_FIT;
         let emcy = emcy::Producer::new(D::Application::CONDITIONS, application.register_bits());
         Inner {
             dictionary,
@@ -226,10 +244,10 @@ impl<D: Definition> Inner<D> {
 
     /// Sets objects to their values after a reset: all objects, or the communication objects only.
     pub(super) fn load_values(&mut self, everything: bool) {
-        if !Self::has(Services::FAULTS) {
-            return self.dictionary.load_defaults(self.image.as_mut());
-        }
         self.load_defaults(if everything { Scope::Everything } else { Scope::Communication });
+        if !Self::has(Services::FAULTS) {
+            return;
+        }
         self.load_stored(Group::Communication);
         if everything {
             self.load_stored(Group::Application);

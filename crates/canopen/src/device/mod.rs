@@ -155,7 +155,9 @@ impl<D: Definition> Device<D> {
     }
 
     /// Lets the application write its state to the image. Mapped values among them are sent with the next
-    /// [`publish`](Device::publish) or event timer.
+    /// [`publish`](Device::publish) or event timer. Nothing checks the values, and a new communication parameter has no effect:
+    /// set it in [`Application::initialise`]. Only the COB-IDs of 1028h, 1201h and 1280h apply at once, without an
+    /// [`Action::Identifiers`]: set the acceptance filters again.
     pub fn show(&mut self, show: impl FnOnce(&mut D::Application, &mut [u8])) {
         show(&mut self.inner.application, self.inner.image.as_mut());
     }

@@ -239,7 +239,9 @@ impl<D: Definition> Inner<D> {
             Rule::HeartbeatWatch if Self::has(Services::HEARTBEAT_CONSUMER) => {
                 self.configure_watch(entry.sub(), now);
             }
-            Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => self.restart_scanner(),
+            Rule::ScannerCount | Rule::ScannerLine if Self::has(Services::MULTIPLEXED_TPDO) => {
+                self.restart_scanner();
+            }
             Rule::PdoCobId
             | Rule::PdoPredefined
             | Rule::PdoType
@@ -271,8 +273,8 @@ impl<D: Definition> Inner<D> {
     }
 }
 
-/// The string that an upload returns: without the zeros at its end.
+/// The string that an upload returns: without the zeros at its end. An empty string is one zero.
 fn text(value: &[u8]) -> &[u8] {
-    let len = value.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    let len = value.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1);
     value.get(..len).unwrap_or(value)
 }

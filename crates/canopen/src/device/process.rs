@@ -5,7 +5,7 @@ use super::inner::Inner;
 use super::rpdos::filter_bit;
 use super::services::Services;
 use super::{Device, Next, STALE};
-use crate::dictionary::Services as Has;
+use crate::dictionary::{Rule, Services as Has};
 use crate::nmt::Command;
 use crate::pdo::{Chain, ProcessContext, Tpdo};
 use crate::sdo::Multiplexer;
@@ -118,12 +118,11 @@ impl<D: Definition> Device<D> {
     }
 
     /// Writes a value for the application, with the checks and effects of a value received by PDO. Returns whether the
-    /// object accepts it: a value of its length, in an object that has a place in the image and is no command. To be called
-    /// before [`publish`](Device::publish), which gives the deadlines that follow.
+    /// object accepts it: a value of its length and within its limits, in an object that has no service of CiA 301 and is
+    /// no command. To be called before [`publish`](Device::publish), which gives the deadlines that follow.
     pub fn write_value(&mut self, at: Multiplexer, bytes: &[u8]) -> bool {
         let Ok(entry) = self.inner.dictionary.find(at.index, at.sub) else { return false };
-        let is_value = !entry.rule().is_computed() && !entry.rule().is_command();
-        is_value
+        matches!(entry.rule(), Rule::Plain | Rule::Application)
             && bytes.len() == usize::from(entry.field().size)
             && self.inner.store_process_value(&entry, bytes)
     }

@@ -127,7 +127,8 @@ impl Jobs {
 
 impl<D: Definition> Device<D> {
     /// Reports the end of the job: `result` goes to the clients that wait for it. If an equal request has followed the
-    /// handover, the job is handed over again instead, and the clients wait for the second run.
+    /// handover, the job is handed over again instead, and the clients wait for the second run. A job may take any time: the
+    /// device sends no abort message meanwhile, because the time-out is the client's.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let now = self.tick(now);
         let jobs = &mut self.inner.jobs;
@@ -293,8 +294,8 @@ impl<D: Definition> Inner<D> {
         self.application.loaded(group, soundness == Soundness::Whole);
     }
 
-    /// Reports groups that could not be loaded, by EMCY.
-    pub(super) fn report_stored(&mut self, now: Tick) {
+    /// Sets the faults of the groups that could not be loaded, and clears those of all others.
+    pub(super) fn set_stored(&mut self, now: Tick) {
         let groups = if Self::has(Services::OWN_GROUPS) { &Group::ALL[..] } else { &Group::COMMON[..] };
         for &group in groups {
             let soundness = self.damage.of(group);

@@ -38,7 +38,9 @@ impl<D: Definition> Inner<D> {
         }
         let (answer, is_back) = self.guarding.answer(self.state, context.now);
         // In a full queue the answer is dropped: the master repeats its request.
-        let _ = context.send(Frame::data_frame(id, 1, [answer, 0, 0, 0, 0, 0, 0, 0]));
+        if context.send(Frame::data_frame(id, 1, [answer, 0, 0, 0, 0, 0, 0, 0])) {
+            self.guarding.toggle();
+        }
         if is_back {
             self.clear(Fault::LifeGuard, context.now);
         }

@@ -6,7 +6,7 @@ use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::{Attributes, Kind, Limits};
 use super::fail::require;
 use super::tables::{Place, Series};
-use super::{Counts, DefaultValue, Group, Object, Rule, check, image_size};
+use super::{Counts, DefaultValue, Group, Object, Rule, check, check_301, image_size};
 
 /// Tables of maximum size, and the number of used elements. The compiler evaluates it once for all dictionaries of a
 /// program, and it is in no image.
@@ -34,6 +34,20 @@ const MAX_ATTRIBUTES: usize = 256;
 #[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
 #[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
 impl TableBuilder {
+    /// As [`checked`](TableBuilder::checked), for tables that conform to CiA 301.
+    ///
+    /// # Panics
+    /// During compilation, when a table is wrong: see [`check`] and [`check_301`].
+    #[must_use]
+    pub const fn conforming(all: &[&[Object]]) -> TableBuilder {
+        let (builder, mut i) = (TableBuilder::checked(all), 0);
+        while i < all.len() {
+            check_301(all[i]);
+            i += 1;
+        }
+        builder
+    }
+
     /// As [`of`](TableBuilder::of), with a check of all tables.
     ///
     /// # Panics

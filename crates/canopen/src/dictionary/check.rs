@@ -14,6 +14,7 @@ use crate::sdo::BUFFER;
 /// During compilation, when a row is wrong. The message begins with index and sub-index of the row.
 #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 pub const fn check(rows: &[Object]) {
+    assert!(!rows.is_empty(), "the table has no rows");
     let (mut i, mut size) = (0, 0);
     while i < rows.len() {
         let row = &rows[i];

@@ -35,8 +35,9 @@ pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
     rows
 }
 
-/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check) first: a wrong table
-/// does not compile, and the error names index and sub-index of the row.
+/// The run-time dictionary of a table of rows. The macro runs [`check`](crate::dictionary::check()) and
+/// [`check_301`](crate::dictionary::check_301()) first: a wrong table does not compile, and the error names index and
+/// sub-index of the row.
 ///
 /// ```compile_fail
 /// use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
@@ -64,7 +65,7 @@ macro_rules! dictionaries {
         // The expression `$all` must not use any of these names.
         const ROWS_OF_ALL: &[&[make::Object]] = &$all;
         #[allow(long_running_const_eval)]
-        const BUILT: make::TableBuilder = make::TableBuilder::checked(ROWS_OF_ALL);
+        const BUILT: make::TableBuilder = make::TableBuilder::conforming(ROWS_OF_ALL);
         static COMPILED_TABLES: make::Tables<
             { ROWS_OF_ALL.len() },
             { BUILT.counts().series },

@@ -9,6 +9,7 @@
 
 mod builder;
 mod check;
+mod check_301;
 mod check_pdos;
 mod compile;
 mod entry;
@@ -28,6 +29,7 @@ mod variable;
 #[doc(hidden)]
 pub use builder::TableBuilder;
 pub use check::check;
+pub use check_301::check_301;
 pub use compile::{Counts, Sizes, compile, count, gather, image_size, pdos, scanned, servers, watches};
 pub use entry::Entry;
 pub(crate) use entry::{Kind, little_endian};

@@ -81,7 +81,8 @@ pub fn is_packed(mut packed: &[u8], index: u16, sub: u8) -> bool {
 
 impl Dictionary {
     /// Writes the values of a group to the beginning of `out`. Returns the number of bytes. A COB-ID with the
-    /// pre-defined CAN-ID of this node-ID follows the node-ID with which it is loaded.
+    /// pre-defined CAN-ID of this node-ID follows the node-ID with which it is loaded. In the place of a value beyond its
+    /// limits, which only the application itself can set, the default is stored: the value would make the set useless.
     ///
     /// # Errors
     /// `BufferFull`; the content of `out` is then useless.
@@ -108,10 +109,11 @@ impl Dictionary {
             if let Some(count) = writer.out.get_mut(head + 3) {
                 *count = count.wrapping_add(1);
             }
-            match self.relative(&entry, node_id, image) {
-                Some(relative) => writer.append(&relative.to_le_bytes())?,
-                None => writer.append(entry.field.get(image))?,
+            let (word, mut value) = (self.number_to_store(&entry, node_id, image), entry.field.get(image));
+            if let Some(word) = &word {
+                value = word.get(..value.len()).unwrap_or(value);
             }
+            writer.append(value)?;
             last = Some((entry, head));
         }
         Ok(writer.len)
@@ -162,6 +164,16 @@ impl Dictionary {
             entry.field.set(image, value);
         }
         Ok(())
+    }
+
+    /// What is stored in the place of a value; `None` for the value itself.
+    fn number_to_store(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> Option<[u8; 4]> {
+        let number = match self.relative(entry, node_id, image) {
+            Some(number) => number,
+            None if entry.check_value(little_endian(entry.field.get(image))).is_ok() => return None,
+            None => self.default_number(entry, node_id),
+        };
+        Some(number.to_le_bytes())
     }
 
     /// The stored form of a COB-ID that follows the node-ID; `None` for any other value.

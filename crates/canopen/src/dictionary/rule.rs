@@ -67,6 +67,8 @@ pub enum Rule {
     PdoCount,
     /// 1600h.., 1A00h..:1 and up, a mapped object.
     PdoSlot,
+    /// 1FA0h:0, number of lines of the object scanner list.
+    ScannerCount,
     /// 1FA0h:1 and up, a line of the object scanner list.
     ScannerLine,
     /// Stores the calibration.
@@ -101,7 +103,8 @@ impl Rule {
             (0x1280..=0x12FF, 1 | 2) => Rule::SdoClientCobId,
             (0x1F51, 1) => Rule::ProgramControl,
             (0x1F80, 0) => Rule::StartUp,
-            (0x1FA0, 1..) => Rule::ScannerLine,
+            (0x1FA0, 0) => Rule::ScannerCount,
+            (0x1FA0, _) => Rule::ScannerLine,
             _ => Rule::of_pdo(index, sub),
         }
     }
@@ -165,6 +168,7 @@ impl Rule {
             Rule::EmcyWatch => 31,
             Rule::SdoServerCobId => 32,
             Rule::SdoClientCobId => 33,
+            Rule::ScannerCount => 34,
             Rule::EventTimerOf(number) => 0x100 | number as u16,
         }
     }
@@ -191,6 +195,7 @@ impl Rule {
             | Rule::PdoType
             | Rule::PdoSyncStart
             | Rule::PdoCount
+            | Rule::ScannerCount
             | Rule::Setting => Some(1),
             Rule::EmcyInhibit
             | Rule::GuardTime

@@ -44,10 +44,14 @@ impl Guarding {
     /// Takes a remote frame. Returns the answer, and whether the master is back.
     pub(crate) fn answer(&mut self, state: State, now: Tick) -> (u8, bool) {
         let answer = state.code() | self.toggle;
-        self.toggle ^= TOGGLE;
         self.rest = self.life_time;
         self.due = self.next_part(now);
         (answer, core::mem::take(&mut self.is_lost))
+    }
+
+    /// An answer has been sent: the next one has the other toggle bit.
+    pub(crate) fn toggle(&mut self) {
+        self.toggle ^= TOGGLE;
     }
 
     /// The end of the next part of the life time; `NEVER` at its end.

@@ -132,7 +132,8 @@ impl<O: Objects> Server<O> {
     #[inline(never)]
     pub(crate) fn deadline(&self) -> Tick {
         match &self.transfer {
-            Transfer::Idle | Transfer::Interrupted { .. } => Tick::NEVER,
+            // While the reply is held back, the client waits for the server.
+            Transfer::Idle | Transfer::Deferred | Transfer::Interrupted { .. } => Tick::NEVER,
             _ if self.is_within_block() => self.active.plus(BLOCK_PAUSE),
             _ => self.active.plus(TIME_OUT),
         }

@@ -50,6 +50,7 @@ struct Tape {
     /// The offset that cannot be read, or written.
     broken: Option<usize>,
     refuses_end: bool,
+    is_empty: bool,
 }
 
 impl Application for Tape {
@@ -77,7 +78,7 @@ impl Application for Tape {
     }
 
     fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
-        Ok(b"a domain as one slice")
+        Ok(if self.is_empty { b"" } else { b"a domain as one slice" })
     }
 
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
@@ -160,8 +161,16 @@ fn upload(node: &mut Node, at: Multiplexer) -> Result<Vec<u8>, u32> {
 }
 
 fn block_upload(node: &mut Node, loses: impl FnMut(usize) -> bool) -> Result<Vec<u8>, u32> {
+    block_upload_of(node, LOG, loses)
+}
+
+fn block_upload_of(
+    node: &mut Node,
+    at: Multiplexer,
+    loses: impl FnMut(usize) -> bool,
+) -> Result<Vec<u8>, u32> {
     let mut memory = [0; 4000];
-    let mut upload = BlockUpload::new(NodeId::new(ID).unwrap(), LOG, Buffer::new(&mut memory), OPTIONS);
+    let mut upload = BlockUpload::new(NodeId::new(ID).unwrap(), at, Buffer::new(&mut memory), OPTIONS);
     run(node, &mut upload, loses)?;
     Ok(upload.into_sink().as_slice().to_vec())
 }
@@ -322,5 +331,20 @@ fn a_download_refused_by_the_application_is_aborted() {
         let refused = Err(Abort::Hardware.code());
         assert_eq!(run(&mut node, &mut BlockDownload::new(id, LOG, &data, OPTIONS), |_| false), refused);
         assert_eq!(calls(&mut node), [Call::Download, Call::Aborted], "{len} bytes in blocks");
+    }
+}
+
+/// Threshold 0 forbids the change to segments (CiA 301, 7.2.4.3.13).
+#[test]
+fn an_empty_domain_is_read_as_no_byte_by_the_requested_protocol() {
+    for at in [LOG, WHOLE] {
+        let mut node = node(0);
+        node.application_mut().is_empty = true;
+        assert_eq!(upload(&mut node, at), Ok(vec![]), "{at:?}");
+        for threshold in [0, 5] {
+            let begin = Request::BlockUpload { at, crc: true, block_size: 5, threshold };
+            assert_eq!(ask(&mut node, begin)[0][0], if threshold == 0 { 0xC6 } else { 0x41 }, "{at:?}");
+        }
+        assert_eq!(block_upload_of(&mut node, at, |_| false), Ok(vec![]), "{at:?}");
     }
 }

@@ -176,3 +176,20 @@ fn the_start_sends_the_present_state_at_once_and_starts_the_event_timer() {
         assert_eq!(start, [500_000, 1_000_000], "type {transmission}");
     }
 }
+
+#[test]
+fn an_event_of_a_sync_waits_for_room_in_the_queue() {
+    for transmission in [0, 1] {
+        let mut bench = operational(transmission, 0, 0);
+        bench.sync();
+        bench.take();
+        bench.device.application_mut().events.extend([[1, 0, 0, 0], [2, 0, 0, 0]]);
+        bench.out.room = 0;
+        bench.sync();
+        bench.out.room = usize::MAX;
+        bench.run(MS);
+        assert_eq!(told(&mut bench), [1], "without another call of the application");
+        bench.sync();
+        assert_eq!(told(&mut bench), [2]);
+    }
+}

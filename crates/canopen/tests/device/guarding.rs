@@ -3,7 +3,7 @@
 use canopen::dictionary::{Dictionary, Object, Services};
 use canopen::nmt::{Command, State};
 use canopen::sdo::Multiplexer;
-use canopen::{Application, Device, Fault, Frame, Instant, NodeId, objects};
+use canopen::{Application, Device, Fault, Frame, Instant, NodeId, QueueFull, Transmit, objects};
 
 use crate::exchange;
 use crate::types::Sent;
@@ -173,4 +173,26 @@ fn the_heartbeat_ends_life_guarding() {
     }
     assert!(node.application().faults.is_empty());
     assert!(sent.0.iter().all(|frame| frame.id() == 0x705));
+}
+
+struct Full;
+
+impl Transmit for Full {
+    fn send(&mut self, _: Frame) -> Result<(), QueueFull> {
+        Err(QueueFull)
+    }
+
+    fn room(&self) -> usize {
+        0
+    }
+}
+
+/// The toggle bit alternates between two consecutive responses (CiA 301, 7.2.8.3.2.1).
+#[test]
+fn an_answer_dropped_in_a_full_queue_leaves_the_toggle_bit() {
+    let mut node = node();
+    assert_eq!(guard(&mut node, 0x705, 2), [[0x7F]]);
+    let _ = node.on_frame(&Frame::remote(0x705, 1).unwrap(), Instant(3), &mut Full);
+    assert_eq!(guard(&mut node, 0x705, 4), [[0xFF]]);
+    assert_eq!(guard(&mut node, 0x705, 5), [[0x7F]]);
 }

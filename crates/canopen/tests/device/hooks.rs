@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, Told};
 use canopen::nmt::State;
+use canopen::sdo::Multiplexer;
 use canopen::{BusEvent, Duration, ErrorClass, Fault, Frame};
 
 const START: u8 = 1;
@@ -147,4 +148,31 @@ fn the_process_half_leaves_waiting_frames_to_the_services() {
     let next = bench.device.poll_services(bench.now, &mut bench.out);
     assert_eq!(next.action, Some(canopen::Action::ResetNode));
     assert!(next.services > bench.now, "nothing else waits");
+}
+
+#[test]
+fn the_application_writes_what_a_pdo_could_write() {
+    let mut bench = Bench::operational();
+    let mut write = |index, sub, bytes: &[u8]| {
+        let before = *bench.device.image();
+        let is_written = bench.device.write_value(Multiplexer { index, sub }, bytes);
+        assert!(is_written || *bench.device.image() == before, "{index:X}h:{sub}: refused without effect");
+        is_written
+    };
+    assert!(write(0x6201, 0, &[12]));
+    assert!(write(0x6203, 0, &[5, 0]));
+    assert!(!write(0x6203, 0, &[6, 0]), "beyond its limits");
+    assert!(!write(0x6201, 0, &[13]), "refused by the application");
+    let served: [(u16, u8, &[u8]); 7] = [
+        (0x1005, 0, &[0, 7, 0, 0]),
+        (0x1016, 1, &[10, 0, 7, 0]),
+        (0x1017, 0, &[50, 0]),
+        (0x1400, 1, &[0x33, 3, 0, 0]),
+        (0x1A00, 0, &[7]),
+        (0x6105, 0, &[50, 0]),
+        (0x5F00, 0, &[1]),
+    ];
+    for (index, sub, bytes) in served {
+        assert!(!write(index, sub, bytes), "{index:X}h has a service");
+    }
 }

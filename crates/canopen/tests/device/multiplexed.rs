@@ -61,7 +61,6 @@ fn in_source_mode_the_scanner_list_is_sent_under_the_own_node_id() {
     let mut bench = sender(SOURCE);
     bench.write32(0x1FA0, 1, 0x0260_0002).unwrap();
     bench.write(0x1FA0, 0, &[1]).unwrap();
-    bench.write32(0x1FA0, 1, 0x0260_0002).unwrap();
     bench.nmt(1);
     assert_eq!(mpdos(&mut bench), [2, 3].map(|sub| vec![ID, 0x00, 0x60, sub, 0, 0, 0, 0]));
     bench.set_value(1, &[1, 0, 0, 0]);
@@ -353,4 +352,19 @@ fn a_write_to_the_scanner_list_leaves_other_pdos_alone() {
     bench.take();
     bench.run(Duration::from_millis(150));
     assert_eq!(errors(&mut bench), [0x8250]);
+}
+
+#[test]
+fn the_number_of_the_scanner_list_applies_when_it_is_written() {
+    let mut bench = sender(SOURCE);
+    bench.nmt(1);
+    bench.write32(0x1FA0, 1, 0x0260_0002).unwrap();
+    bench.take();
+    bench.write(0x1FA0, 0, &[1]).unwrap();
+    assert_eq!(mpdos(&mut bench), [2, 3].map(|sub| vec![ID, 0x00, 0x60, sub, 0, 0, 0, 0]));
+    bench.set_value(2, &[7, 0]);
+    assert_eq!(mpdos(&mut bench), [[ID, 0x00, 0x60, 2, 7, 0, 0, 0]]);
+    bench.write(0x1FA0, 0, &[0]).unwrap();
+    bench.set_value(2, &[8, 0]);
+    assert_eq!(mpdos(&mut bench), [[0; 8]; 0], "no line is left");
 }

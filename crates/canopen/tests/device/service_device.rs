@@ -1,6 +1,6 @@
 //! The service device alone: NMT, SDO, heartbeat and LSS, without the other services.
 
-use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
+use canopen::dictionary::{Access, Dictionary, Group, Mapping, Object, Type};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer, Request, Response};
 use canopen::{
@@ -20,8 +20,13 @@ const ROWS: &[Object] = canopen::rows!(
     objects::identity(1, 2, 3),
     objects::emergency(),
     objects::store_parameters(),
+    objects::default_sdo_server(),
     objects::tpdo(1, &[VALUE]),
-    [Object::new(0x2000, 0, "", Type::Domain, Access::ReadWrite), VALUE],
+    [
+        Object::new(0x2000, 0, "", Type::Domain, Access::ReadWrite),
+        VALUE,
+        Object::new(0x2002, 0, "", Type::Unsigned8, Access::ReadWrite).stored(Group::Application).value(4),
+    ],
 );
 static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
@@ -195,4 +200,25 @@ fn an_unknown_command_is_refused() {
     let answers = bench.receive(Frame::new(0x600 + u16::from(ID), &[0xE0, 0, 0, 0, 0, 0, 0, 0]).unwrap());
     let data = answers[0].data().try_into().unwrap();
     assert!(matches!(Response::parse(data), Some(Response::Abort(_, 0x0504_0001))));
+}
+
+#[test]
+fn a_reset_of_the_communication_keeps_the_values_of_the_application() {
+    let mut bench = Bench::booted();
+    let before_and_after = |bench: &mut Bench, command| {
+        bench.write(0x2002, 0, &[9]).unwrap();
+        bench.write(0x1014, 0, &[0x85, 0, 0, 0]).unwrap();
+        bench.nmt(command);
+        let _ = bench.device.start(bench.now, &mut Sent::default());
+        (bench.read(0x2002, 0).unwrap(), bench.read(0x1014, 0).unwrap())
+    };
+    let default = vec![0x80 + ID, 0, 0, 0];
+    assert_eq!(before_and_after(&mut bench, 0x82), (vec![9], default.clone()));
+    assert_eq!(before_and_after(&mut bench, 0x81), (vec![4], default));
+}
+
+#[test]
+fn a_default_cob_id_includes_the_node_id() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.read(0x1200, 1), Ok((0x600 + u32::from(ID)).to_le_bytes().to_vec()));
 }

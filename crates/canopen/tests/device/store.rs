@@ -2,7 +2,8 @@
 
 use crate::bench::{Bench, DICTIONARY, ID};
 use canopen::dictionary::{Access, Group, Groups, Object, Type, is_packed, packed_size};
-use canopen::sdo::Abort;
+use canopen::nmt::State;
+use canopen::sdo::{Abort, Multiplexer, Request};
 use canopen::{Action, Job, NodeId};
 
 const SAVE: [u8; 4] = *b"save";
@@ -132,13 +133,25 @@ fn the_client_can_do_something_else_meanwhile() {
     assert_eq!(bench.read(0x1000, 0), Ok(vec![0x94, 1, 2, 0]));
 }
 
+/// The client waits for the server: the time-out is the client's.
 #[test]
-fn a_silent_memory_times_out() {
+fn a_slow_memory_does_not_time_out() {
     let mut bench = Bench::booted();
     begin(&mut bench, 0x1010, 1, SAVE);
-    bench.run(canopen::Duration::from_millis(1100));
-    let aborts = bench.sent().into_iter().filter(|(id, _)| *id == 0x585);
-    assert_eq!(aborts.map(|(_, data)| data[4..8].to_vec()).collect::<Vec<_>>(), [[0, 0, 4, 5]]);
+    bench.run(canopen::Duration::from_millis(5000));
+    assert!(bench.sent().iter().all(|(id, _)| *id != 0x585), "no response before the end of the job");
+    assert_eq!(finish(&mut bench, Ok(())), [0x60, 0x10, 0x10, 1, 0, 0, 0, 0]);
+}
+
+#[test]
+fn a_client_that_has_aborted_gets_no_response_of_its_job() {
+    let mut bench = Bench::booted();
+    begin(&mut bench, 0x1010, 1, SAVE);
+    bench.run(canopen::Duration::from_millis(5000));
+    assert_eq!(bench.ask(Request::Abort(Multiplexer { index: 0x1010, sub: 1 }, 0x0504_0000)), None);
+    bench.take();
+    bench.finish(Ok(()));
+    assert_eq!(bench.sent(), []);
 }
 
 #[test]
@@ -258,8 +271,8 @@ fn unfitting_stored_values_are_refused_as_a_whole_and_reported() {
         bench.device.application_mut().stored[0].clear();
         bench.nmt(RESET_COMMUNICATION);
         bench.start();
-        let emcy = bench.sent().into_iter().rfind(|(id, _)| *id == 0x085).expect("an EMCY");
-        assert_eq!(emcy.1[..2], [0, 0]);
+        assert!(bench.sent().iter().all(|(id, _)| *id != 0x085), "no fault is left");
+        assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
     }
 }
 
@@ -306,4 +319,47 @@ fn a_setting_is_stored_at_once_and_shown_by_the_application() {
     assert_eq!(bench.read(0x5F00, 0), Ok(vec![0]), "it is not stored yet");
     assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "asked again");
     assert_eq!(finish(&mut bench, Ok(())), [0x60, 0, 0x5F, 0, 0, 0, 0, 0]);
+}
+
+/// The groups are loaded before the active faults are reported again.
+#[test]
+fn a_repaired_group_is_not_reported_at_the_next_reset() {
+    for (command, is_lost) in
+        [(RESET_COMMUNICATION, true), (RESET_COMMUNICATION, false), (RESET_NODE, true), (RESET_NODE, false)]
+    {
+        let mut bench = Bench::booted();
+        let application = bench.device.application_mut();
+        application.is_damaged = !is_lost;
+        application.stored[0] = if is_lost { vec![1, 2, 3] } else { vec![] };
+        bench.nmt(command);
+        bench.start();
+        assert!(bench.sent().iter().any(|(id, data)| *id == 0x085 && data[..2] == [0x02, 0x63]));
+        bench.write(0x1029, 2, &[2]).unwrap();
+        bench.write(0x1017, 0, &[0, 0]).unwrap();
+        save(&mut bench);
+        bench.device.application_mut().is_damaged = false;
+        bench.nmt(command);
+        bench.start();
+        assert_eq!(bench.sent(), [(0x705, vec![0])], "the boot-up message alone");
+        assert_eq!(bench.device.state(), State::PreOperational, "no error for 1029h");
+        assert_eq!((bench.read(0x1001, 0), bench.read(0x1003, 0)), (Ok(vec![0]), Ok(vec![0])));
+    }
+}
+
+#[test]
+fn a_value_beyond_its_limits_is_stored_as_its_default() {
+    let mut bench = Bench::booted();
+    bench.write(0x6103, 0, b"kept").unwrap();
+    bench.device.show(|_, image| {
+        DICTIONARY.field(0x6100, 0).set_i16(image, 300);
+        DICTIONARY.field(0x6101, 0).set_f32(image, f32::NAN);
+        DICTIONARY.field(0x1029, 1).set_u8(image, 255);
+    });
+    save(&mut bench);
+    bench.device.application_mut().loaded.clear();
+    reset(&mut bench, RESET_NODE);
+    assert_eq!(bench.device.application().loaded.iter().find(|(_, good)| !good), None);
+    assert_eq!(bench.read(0x6103, 0), Ok(b"kept".to_vec()));
+    assert_eq!((bench.read(0x6100, 0), bench.read(0x6101, 0)), (Ok(vec![0, 0]), Ok(vec![0; 4])));
+    assert_eq!(bench.read(0x1029, 1), Ok(vec![0]));
 }

@@ -1,7 +1,9 @@
 //! A wrong table does not compile. `check` is a constant function: here it runs with the test, and its message is the
 //! compile error.
 
-use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, TableBuilder, Type, check};
+use canopen::dictionary::{
+    Access, DefaultValue, Group, Mapping, Object, TableBuilder, Type, check, check_301,
+};
 use canopen::objects;
 
 const INPUT: Object =
@@ -19,7 +21,10 @@ fn changed(mut row: Object, change: impl FnOnce(&mut Object)) -> Object {
 fn compile_error(parts: &[&[Object]]) -> Option<String> {
     let mut rows = parts.concat();
     rows.sort_by_key(Object::key);
-    message_of(move || check(&rows))
+    message_of(move || {
+        check(&rows);
+        check_301(&rows);
+    })
 }
 
 /// The message of a panic; `None` without a panic.
@@ -355,4 +360,44 @@ fn rows_without_remote_frames_stay_without_them() {
     let off = objects::without_remote(objects::tpdo(5, &[]));
     assert_eq!(off[1].default, DefaultValue::Integer(0xC000_0000));
     assert_eq!(objects::without_remote(off)[1].default, off[1].default);
+}
+
+/// The device itself reads and writes these entries.
+#[test]
+fn an_entry_of_the_device_has_the_size_of_cia_301() {
+    let error_behaviour = objects::error_behaviour(0)[1];
+    for (row, kind, name) in [
+        (objects::device_type(0), Type::Unsigned8, "1000h:0"),
+        (objects::error_register(), Type::Unsigned32, "1001h:0"),
+        (objects::identity(0, 1, 1)[1], Type::Unsigned8, "1018h:1"),
+        (error_behaviour, Type::Unsigned16, "1029h:1"),
+    ] {
+        let wrong = changed(row, |row| row.kind = kind);
+        let highest = Object::highest(row.index, 1, "");
+        let rows = if row.sub == 0 { vec![wrong] } else { vec![highest, wrong] };
+        assert_error(&[&rows], &format!("{name}: the entry of CiA 301 has a type of another size"));
+    }
+}
+
+#[test]
+fn the_highest_sub_index_is_that_of_the_last_row() {
+    let entry = |sub| Object::new(0x2000, sub, "", Type::Unsigned8, Access::ReadWrite);
+    let message = "2000h:0: sub-index 0 is not the highest sub-index of the object";
+    assert_error(&[&[Object::highest(0x2000, 1, ""), entry(1), entry(2)]], message);
+    assert_error(&[&[Object::highest(0x2000, 7, ""), entry(1)]], message);
+    assert_eq!(compile_error(&[&[Object::highest(0x2000, 5, ""), entry(1), entry(5)]]), None, "with a gap");
+    assert_eq!(compile_error(&[&[Object::highest(0x2000, 7, "")]]), None, "a single constant");
+    assert_eq!(compile_error(&[&[Object::highest(0x2000, 0, ""), entry(1)]]), None, "set by the application");
+}
+
+#[test]
+fn a_guard_time_has_a_life_time_factor() {
+    let [time, factor] = objects::node_guarding();
+    assert_error(&[&[time]], "100Ch:0: node guarding needs 100Ch and 100Dh");
+    assert_error(&[&[factor]], "100Dh:0: node guarding needs 100Ch and 100Dh");
+}
+
+#[test]
+fn a_table_without_rows_does_not_compile() {
+    assert_eq!(message_of(|| check(&[])).as_deref(), Some("the table has no rows"));
 }

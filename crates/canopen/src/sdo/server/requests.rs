@@ -137,9 +137,10 @@ impl<O: Objects> Server<O> {
         Ok(self.upload_value(at, value))
     }
 
-    /// Begins the upload of a value that has been read.
+    /// Begins the upload of a value that has been read. One to four bytes are in the response itself, which cannot be
+    /// empty.
     fn upload_value(&mut self, at: Multiplexer, value: &[u8]) -> bool {
-        if value.len() <= 4 {
+        if matches!(value.len(), 1..=4) {
             return self.set_reply(Response::Uploaded(at, Bytes::from_slice(value)));
         }
         let source = Source::new(at, value, &mut self.buffer);
@@ -147,7 +148,7 @@ impl<O: Objects> Server<O> {
         self.set_reply(Response::UploadSegmented(at, Some(source.size())))
     }
 
-    /// Begins an upload in parts, in segments. One to four bytes are in the response itself, which cannot be empty.
+    /// Begins an upload in parts, in segments, as [`upload_value`](Server::upload_value).
     fn upload_parts(&mut self, mut source: Source, at: Multiplexer, objects: &mut O) -> Answer {
         if matches!(source.len(), 1..=4) {
             let piece = source.piece(0, &mut self.buffer, objects);
@@ -238,7 +239,7 @@ impl<O: Objects> Server<O> {
             let size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
             if let Some(len) = objects.open(at)? {
                 let source = Source::in_parts(at, len);
-                return if len <= usize::from(threshold) {
+                return if is_short(len, threshold) {
                     self.upload_parts(source, at, objects)
                 } else {
                     Ok(self.send_blocks(at, source, size))
@@ -246,7 +247,7 @@ impl<O: Objects> Server<O> {
             }
         }
         let value = objects.read(at)?;
-        if value.len() <= usize::from(threshold) {
+        if is_short(value.len(), threshold) {
             return Ok(self.upload_value(at, value));
         }
         let source = Source::new(at, value, &mut self.buffer);
@@ -265,4 +266,9 @@ impl<O: Objects> Server<O> {
             _ => Err(Abort::Command),
         }
     }
+}
+
+/// Whether an upload of `len` bytes changes from blocks to segments; never with the threshold 0.
+fn is_short(len: usize, threshold: u8) -> bool {
+    threshold != 0 && len <= usize::from(threshold)
 }
