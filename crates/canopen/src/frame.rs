@@ -27,6 +27,7 @@ impl Frame {
     }
 
     /// A data frame of the first `len` bytes, at most eight.
+    #[inline(always)]
     pub(crate) fn data_frame(id: CanId, len: u8, data: [u8; 8]) -> Frame {
         Frame { head: head(id.get(), len), data }
     }

@@ -229,6 +229,7 @@ impl Sink {
     }
 
     /// Lets `append_direct` take at most this many segments, limited by the room in the buffer.
+    #[inline(never)]
     pub(super) fn allow_direct(&mut self, segments: usize) {
         self.direct = in_buffer(self.most_held().min(usize::from(self.held) + 7 * segments));
     }
