@@ -127,17 +127,24 @@ impl Fault {
     /// The bit of a fault that can be active only once; `None` for a fault with a number.
     const fn bit(self) -> Option<u8> {
         match self {
-            Fault::Overrun => Some(0),
-            Fault::ErrorPassive => Some(1),
-            Fault::BusOffRecovered => Some(2),
-            Fault::SyncMissing => Some(3),
-            Fault::SyncLength => Some(4),
-            Fault::MpdoNotTaken => Some(5),
-            Fault::LifeGuard => Some(6),
             Fault::StoredData(group) => Some(7 + group as u8),
             Fault::OlderData(group) => Some(15 + group as u8),
-            _ => None,
+            _ => self.plain_bit(),
         }
+    }
+
+    // By itself: the compiler then takes the bit from the fault, without a table.
+    const fn plain_bit(self) -> Option<u8> {
+        Some(match self {
+            Fault::Overrun => 0,
+            Fault::ErrorPassive => 1,
+            Fault::BusOffRecovered => 2,
+            Fault::SyncMissing => 3,
+            Fault::SyncLength => 4,
+            Fault::MpdoNotTaken => 5,
+            Fault::LifeGuard => 6,
+            _ => return None,
+        })
     }
 
     /// The codes of the fault in EMCY and error register. For a heartbeat, the first two bytes of the error field are
