@@ -83,7 +83,20 @@ impl Command {
         if node != 0 && node != own.get() {
             return None;
         }
-        Command::ALL.into_iter().find(|&command| command as u8 == specifier)
+        Command::from_specifier(specifier)
+    }
+
+    /// The command with a specifier; `None` for a reserved one.
+    #[must_use]
+    pub const fn from_specifier(specifier: u8) -> Option<Command> {
+        Some(match specifier {
+            0x01 => Command::Start,
+            0x02 => Command::Stop,
+            0x80 => Command::EnterPreOperational,
+            0x81 => Command::ResetNode,
+            0x82 => Command::ResetCommunication,
+            _ => return None,
+        })
     }
 
     /// The data of the frame, for one node, or for all nodes with `None`.

@@ -15,7 +15,7 @@ use crate::meaning::emergency;
 pub(super) fn nmt(frame: &Frame) -> Said {
     let &[specifier, node] = frame.data() else { return odd(frame, "no NMT command") };
     let whom = if node == 0 { "all nodes".to_owned() } else { format!("node {node}") };
-    let command = Command::ALL.into_iter().find(|&command| command as u8 == specifier);
+    let command = Command::from_specifier(specifier);
     Said::text(match command {
         Some(Command::Start) => format!("start {whom}"),
         Some(Command::Stop) => format!("stop {whom}"),
