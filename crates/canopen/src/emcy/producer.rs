@@ -95,6 +95,7 @@ impl Producer {
     }
 
     /// Takes the inhibit time of 1015h. It applies to a waiting message, too.
+    #[inline(never)]
     pub(crate) fn set_inhibit(&mut self, inhibit: u16, now: Tick) {
         self.inhibit = inhibit;
         if !self.is_idle() {

@@ -15,6 +15,7 @@ pub(crate) struct Watch {
 impl Watch {
     /// From the value of 1016h: bits 0..15 are the time in ms, bits 16..23 the node-ID. `None` for an unused entry:
     /// time 0, or no valid node-ID.
+    #[inline(never)]
     pub(crate) fn parse(value: u32) -> Option<Watch> {
         let [low, high, node, _] = value.to_le_bytes();
         let period = u16::from_le_bytes([low, high]);

@@ -219,11 +219,7 @@ impl Sink {
             return Err(Abort::TooLong);
         }
         let place = buffer.get_mut(usize::from(self.held)..end).ok_or(Abort::TooLong)?;
-        // A copy of a length that is known at compile time takes two words.
-        match (place.first_chunk_mut::<7>(), bytes.first_chunk()) {
-            (Some(place), Some(segment)) => *place = *segment,
-            _ => copy(place, bytes),
-        }
+        copy(place, bytes);
         self.held = in_buffer(end);
         Ok(())
     }
@@ -235,6 +231,7 @@ impl Sink {
     }
 
     /// The maximum number of bytes in the buffer, given by its size and by the limit of the download.
+    #[inline(never)]
     fn most_held(&self) -> usize {
         self.limit.saturating_sub(self.gone).min(BUFFER)
     }
