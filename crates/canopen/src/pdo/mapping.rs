@@ -72,18 +72,20 @@ impl Layout {
         Layout { len: 0, count: 0, is_checked: false, places: [Field { offset: 0, size: 0 }; 8] };
 
     /// Appends a mapped object; `PdoLength` when the PDO would grow beyond eight bytes.
+    #[allow(clippy::indexing_slicing, reason = "eight bytes are eight places at most")]
     pub(crate) fn push(&mut self, Located { field, takes_any }: Located) -> Result<(), Abort> {
         self.is_checked |= !takes_any;
         let len = self.len.saturating_add(field.size);
         if len > 8 {
             return Err(Abort::PdoLength);
         }
-        match self.places.get_mut(usize::from(self.count).wrapping_sub(1)) {
-            Some(last) if last.end() == field.offset => last.size += field.size,
-            _ => {
-                *self.places.get_mut(usize::from(self.count)).ok_or(Abort::PdoLength)? = field;
-                self.count += 1;
-            }
+        let count = usize::from(self.count);
+        let last = &mut self.places[count.wrapping_sub(1) & 7];
+        if count != 0 && last.end() == field.offset {
+            last.size += field.size;
+        } else {
+            self.places[count & 7] = field;
+            self.count += 1;
         }
         self.len = len;
         Ok(())

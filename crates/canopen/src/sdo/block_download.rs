@@ -134,7 +134,7 @@ impl Receiver {
         self.acknowledged = self.next - 1;
         self.newest = 0;
         self.next_then = 1;
-        self.sink.allow_direct(0);
+        self.sink.forbid_direct();
         self.next = 1;
         Ok(self.acknowledged)
     }

@@ -230,6 +230,11 @@ impl Sink {
         self.direct = in_buffer(self.most_held().min(usize::from(self.held) + 7 * segments));
     }
 
+    /// Lets `append_direct` take none.
+    pub(super) fn forbid_direct(&mut self) {
+        self.direct = 0;
+    }
+
     /// The maximum number of bytes in the buffer, given by its size and by the limit of the download.
     #[inline(never)]
     fn most_held(&self) -> usize {
