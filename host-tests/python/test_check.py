@@ -6,9 +6,12 @@ on the emulated board, where a deviation counts at once.
 
 import json
 import os
+import signal
+import subprocess
+import time
 
 import pytest
-from simulator import Master, Simulator, nodectl
+from simulator import PATIENCE, Master, Relay, Simulator, nodectl
 
 #: The personality that is checked in a usual run; --thorough checks all.
 CHECKED = ["pressure", "lift", "encoder", "combined"] if "THOROUGH" in os.environ else ["pressure"]
@@ -42,4 +45,32 @@ def test_every_check_passes(personality: str):
             print("again:", failed)
             failed = check(simulator, list(failed))
     assert not failed, f"failed in each of {TRIES} tries: {failed}"
+    simulator.quit()
+
+
+#: The checks, and the write after which they are interrupted: the first change of a TPDO, the order to restore the defaults, an order to save.
+CHANGES = [("PDO", "2B00180"), ("STO", "23111001"), ("STO-2", "23101001")]
+
+
+@pytest.mark.parametrize("term", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("personality", "only", "change"), [(name, *change) for name, change in zip(("pressure", "encoder", "combined"), CHANGES)])
+def test_an_interrupted_check_leaves_what_the_node_had(personality: str, only: str, change: str, term: signal.Signals):
+    simulator = Simulator("--node", f"5:{personality}", "--bitrate", "1000", speed="real")
+    Master(simulator).close()
+    assert nodectl(simulator, "write", "1017", "700", node=5).returncode == 0
+    assert nodectl(simulator, "save", node=5).returncode == 0
+    before = nodectl(simulator, "dump", node=5).stdout
+    relay = Relay(simulator)
+    command = [os.environ["NODECTL_COMMAND"], "--bus", f"socketcand://127.0.0.1:{relay.socketcand}/vcan0", "--node", "5"]
+    process = subprocess.Popen([*command, "check", "--yes", "--only", only], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + PATIENCE
+    while not any(can_id == 0x605 and data.startswith(change) for _, _, can_id, data in list(relay.frames)):
+        assert process.poll() is None and time.monotonic() < end, f"no write {change}: {process.communicate()}"
+        time.sleep(0.01)
+    process.send_signal(term)
+    out, error = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130 and "interrupted" in error and "the run was interrupted" in out, (out, error)
+    assert nodectl(simulator, "dump", node=5).stdout == before
+    assert nodectl(simulator, "nmt", "reset", node=5).returncode == 0
+    assert nodectl(simulator, "dump", node=5).stdout == before, "what was saved is saved"
     simulator.quit()

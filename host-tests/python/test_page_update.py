@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import pytest
 from page import Page, Server
 from selenium.common.exceptions import JavascriptException
 from simulator import Simulator
@@ -61,3 +62,81 @@ def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path, driver):
     finally:
         server.stop()
         simulator.end()
+
+
+@pytest.fixture
+def two(driver):
+    """A page with two nodes."""
+    simulator = Simulator("--bitrate", "1000", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
+    server = Server(simulator)
+    page = Page(driver, server.url)
+    for node in (1, 2):
+        page.says(f"tr[data-node='{node}']", "STM32F4")
+    yield page, server, simulator
+    page.leave()
+    server.stop()
+    simulator.end()
+
+
+STARTS = "return [...document.querySelectorAll('#view-update button')].some(({ innerText, disabled }) => innerText === 'Update the node' && !disabled)"
+
+
+def test_one_file_updates_two_nodes(two, tmp_path: Path):
+    page, _, _ = two
+    b = image(tmp_path / "b.img", "0.2.0")
+    page.view("update")
+    assert "the program fits" in checked(page, b)
+    for node in (1, 2):
+        page.choose("Node", str(node))
+        page.until(lambda: page.script(STARTS), f"check the same file for node {node}")
+        page.press("Update the node")
+        page.says("#view-update .outcome", f"is now version 0.1.0, identification {identification(b):08X}h")
+        page.until(lambda: page.read(node, 0x1F56, 1) == identification(b), f"read the identification in node {node}")
+
+
+def test_the_same_file_is_chosen_again(two):
+    page, _, _ = two
+    page.view("update")
+    for _ in range(2):
+        page.script("document.querySelector('#view-update .outcome').textContent = ''")
+        page.script("document.querySelector('#view-update input[type=file]').click = () => {}")
+        # As the dialog of a browser does: it opens with a click, and an unchanged choice is no change.
+        page.script("document.querySelector('#view-update input[type=file]').dispatchEvent(new MouseEvent('click', { cancelable: true }))")
+        assert "the program fits" in checked(page, Path(os.environ["NODE_IMAGES"]) / "firmware.img")
+
+
+def test_a_chosen_file_is_checked_again_after_a_lost_connection(two):
+    page, server, simulator = two
+    page.view("update")
+    checked(page, Path(os.environ["NODE_IMAGES"]) / "firmware.img")
+    server.stop()
+    page.says("#connection", "no server: trying again")
+    again = Server(simulator, server.url.split("/")[2].split("?")[0])
+    try:
+        page.says("#connection", "connected")
+        page.says("#view-update .outcome", "the program fits")
+        page.press("Update the node")
+        page.says("#view-update .outcome", "the node runs this program already")
+    finally:
+        server.process, again.process = again.process, server.process
+
+
+#: Bytes of the largest message that a server takes.
+LARGEST = 2 * 1024 * 1024
+
+
+@pytest.mark.parametrize("size", [LARGEST * 3 // 4, LARGEST, 3 * LARGEST])
+@pytest.mark.parametrize(("view", "label", "words"), [("update", "Program", "a signed image, as firmware.img"), ("dictionary", "Apply a file", "a configuration file")])
+def test_a_file_that_is_too_large_is_refused_and_the_connection_stays(two, tmp_path: Path, view: str, label: str, words: str, size: int):
+    page, _, _ = two
+    page.script("window.lost = 0; window.canopen.bus.on('connected', () => window.lost += 1)")
+    page.view(view)
+    if view == "dictionary":
+        page.script("document.querySelector('#view-dictionary details.box').open = true")
+    file = tmp_path / "large.img"
+    file.write_bytes(b"[FileInfo]\n" + b"x\n" * (size // 2))
+    page.field(label).send_keys(str(file))
+    text = page.says(f"#view-{view} .outcome", "is too large")
+    assert text.startswith("large.img") and words in text, text
+    assert page.read(1, 0x1000) == 0x0002_0194
+    assert page.script("return window.lost") == 0

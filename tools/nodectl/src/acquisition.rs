@@ -290,8 +290,18 @@ impl Signal {
     /// A signal that is read by SDO, with the name of its data sheet.
     pub(crate) fn read(at: Multiplexer, catalogue: &Catalogue) -> Signal {
         let name = catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default();
-        let signal = Signal::polled(at, &name, catalogue.unit(at));
+        // The address of the object with the unit is no unit.
+        let unit = Some(catalogue.unit(at)).filter(|unit| eds::address(unit).is_none());
+        let signal = Signal::polled(at, &name, unit.unwrap_or_default());
         Signal { path: catalogue.name(at), data_type: catalogue.data_type(at), ..signal }
+    }
+
+    /// Sets the unit and the scale. Returns whether they are new.
+    pub(crate) fn measure(&mut self, quantity: Quantity) -> bool {
+        let is_new = self.quantity != quantity;
+        self.unit.clone_from(&quantity.unit);
+        self.quantity = quantity;
+        is_new
     }
 
     /// The name of the data type; empty where none is known.

@@ -73,9 +73,8 @@ const ACKNOWLEDGE: u8 = 0xA2;
 impl OtherClients {
     /// Takes a frame from the bus. Returns the transfer that the frame has ended.
     pub(crate) fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<(NodeId, Transferred)> {
-        if let Some((node, channel)) = self.channels.iter().find(|(_, channel)| channel.has(frame)) {
-            let frame = channel.to_default(*node, frame)?;
-            return self.additional.on_frame(*node, &frame, now);
+        if let Some((node, true, frame)) = self.sdo(frame) {
+            return self.additional.on_frame(node, &frame, now);
         }
         if let Some(delay) = switch_delay(frame) {
             self.retuning = Retuning { since: now, until: now + delay + delay, heard: BTreeSet::new() };
@@ -87,6 +86,16 @@ impl OtherClients {
         }
         let is_sdo = matches!(frame.id(), 0x581..=0x5FF | 0x601..=0x67F);
         is_sdo.then(|| self.default.on_frame(node, frame, now))?
+    }
+
+    /// The node of an SDO frame, whether its channel is an additional one, and the frame with its CAN-ID on the default
+    /// channel; `None` for any other frame.
+    pub(crate) fn sdo(&self, frame: &Frame) -> Option<(NodeId, bool, Frame)> {
+        if let Some((node, channel)) = self.channels.iter().find(|(_, channel)| channel.has(frame)) {
+            return Some((*node, true, channel.to_default(*node, frame)?));
+        }
+        let node = NodeId::new(u8::try_from(frame.id() & 0x7F).ok()?)?;
+        matches!(frame.id(), 0x581..=0x5FF | 0x601..=0x67F).then_some((node, false, *frame))
     }
 
     /// The channel that this program uses for a node: the default one where no other is set.

@@ -1,5 +1,7 @@
 //! The unit and the decimal point of the number in an object.
 
+use std::convert::Infallible;
+
 use canopen::sdo::Multiplexer;
 use eds::{Class, DataType};
 
@@ -71,6 +73,17 @@ impl Quantity {
             None => 0,
         };
         Ok(Quantity { unit: symbol(code), scale: Scale::new(1, digits) })
+    }
+
+    /// The objects of a node that the quantity of an object depends on.
+    #[must_use]
+    pub(crate) fn sources(catalogue: &Catalogue, of: Multiplexer) -> Vec<Multiplexer> {
+        let mut sources = Vec::new();
+        let _ = Quantity::by(catalogue, of, |at| {
+            sources.push(at);
+            Ok::<_, Infallible>(Some(1))
+        });
+        sources
     }
 
     /// A number of steps, each of a size such as `10 um` or `0.1 mm/s`.

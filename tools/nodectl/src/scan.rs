@@ -10,6 +10,7 @@ use crate::Network;
 use crate::bus::BusError;
 use crate::heartbeat::Heartbeat;
 use crate::object::at;
+use crate::sdo::{Cause, Client, Error, Options};
 
 /// The time between two requests, so that no queue overflows.
 const PACE: Duration = Duration::from_millis(2);
@@ -28,14 +29,29 @@ pub struct Presence {
 /// # Errors
 /// The bus is lost.
 pub fn scan(network: &mut Network, time: Duration) -> Result<BTreeMap<NodeId, Presence>, BusError> {
-    let mut found = BTreeMap::new();
+    let (mut found, begin) = (BTreeMap::new(), network.now());
     for node in (1..=127).filter_map(NodeId::new) {
         network.pass()?;
         ask(network, node)?;
         listen(network, PACE, &mut found)?;
     }
     listen(network, time, &mut found)?;
+    for (node, presence) in &mut found {
+        if presence.device_type.is_none() && network.has_other_request_since(*node, begin) {
+            ask_again(network, *node, presence)?;
+        }
+    }
     Ok(found)
+}
+
+/// Asks a node whose SDO server another client has used during the scan: the server serves one transfer at a time.
+fn ask_again(network: &mut Network, node: NodeId, presence: &mut Presence) -> Result<(), BusError> {
+    match Client::new(network, node, Options::default()).upload(at(0x1000, 0)) {
+        Ok(bytes) => presence.device_type = bytes.try_into().ok().map(u32::from_le_bytes),
+        Err(Error { cause: Cause::Bus(error), .. }) => return Err(error),
+        Err(_) => {}
+    }
+    Ok(())
 }
 
 /// Asks a node for its device type.
@@ -55,7 +71,9 @@ fn listen(
             found.entry(heartbeat.node).or_default().state = Some(heartbeat.state);
         }
         if let Some((node, device_type)) = answer(frame) {
-            found.entry(node).or_default().device_type = device_type;
+            // An answer to another client is the sign of a node, and has no device type.
+            let presence = found.entry(node).or_default();
+            presence.device_type = device_type.or(presence.device_type);
         }
         None::<()>
     })?;

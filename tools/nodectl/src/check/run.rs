@@ -20,6 +20,9 @@ const LOOK: u64 = 1200;
 /// With a longer stall of this computer, the adapter or a simulated bus, a deviation may be one of the measurement.
 const STEADY: Duration = Duration::from_millis(5);
 
+/// The reason of the checks that an interruption has ended or skipped.
+const INTERRUPTED: &str = "the run was interrupted";
+
 /// How often a check is run that has found a deviation during a stall.
 const TRIES: usize = 5;
 
@@ -54,6 +57,8 @@ pub struct Run {
     pub results: Vec<Result>,
     /// The values that the device refused to take back after the run.
     pub left_behind: Vec<String>,
+    /// Whether the user has interrupted the run. The checks after the interruption are skipped.
+    pub is_interrupted: bool,
 }
 
 impl Run {
@@ -70,22 +75,32 @@ impl Run {
 /// The device does not answer at all, or the bus is lost.
 pub fn run(subject: &mut Subject<'_>, options: &Options, mut progress: impl FnMut(&Result)) -> Outcome<Run> {
     subject.may_store = options.allowed >= Effect::Stores;
-    let before = subject.begin()?;
+    let before = subject.sheltered(Subject::begin)?;
     let mut results = Vec::new();
     for check in &options.checks {
-        let result = if check.effect > options.allowed { skipped(*check) } else { one(subject, *check)? };
+        let reason = reason(*check, options.allowed).or(subject.is_interrupted().then_some(INTERRUPTED));
+        let result = match reason {
+            Some(reason) => skipped(*check, reason),
+            None => one(subject, *check)?,
+        };
         progress(&result);
         results.push(result);
     }
-    let left_behind = subject.end(&before)?;
-    Ok(Run { node: subject.node(), results, left_behind })
+    let is_interrupted = results.iter().any(|result| result.verdict == Verdict::Skipped(INTERRUPTED.into()));
+    let left_behind = subject.sheltered(|subject| subject.end(&before))?;
+    Ok(Run { node: subject.node(), results, left_behind, is_interrupted })
 }
 
-fn skipped(check: Check) -> Result {
+/// Why a check is skipped that may not have its effect.
+fn reason(check: Check, allowed: Effect) -> Option<&'static str> {
     let reason = match check.effect {
         Effect::Stores => "it writes the memory of the device, which was not allowed (--yes)",
         _ => "it restarts the device, which was not allowed (--yes)",
     };
+    (check.effect > allowed).then_some(reason)
+}
+
+fn skipped(check: Check, reason: &str) -> Result {
     Result { check, verdict: Verdict::Skipped(reason.to_owned()), time: Duration(0), frames: Vec::new() }
 }
 
@@ -113,7 +128,7 @@ fn one(subject: &mut Subject<'_>, check: Check) -> std::result::Result<Result, B
 fn once(subject: &mut Subject<'_>, check: Check) -> std::result::Result<Verdict, BusError> {
     subject.network.begin_log();
     let tried = subject.tidy().and_then(|()| (check.run)(subject));
-    let tidied = subject.tidy().and_then(|()| subject.put_back());
+    let tidied = subject.sheltered(|subject| subject.tidy().and_then(|()| subject.put_back()));
     // A skipped check has to restore its values, too.
     let outcome = match (tried, tidied) {
         (Ok(()) | Err(Stop::Skipped(_)), Err(stop)) => Err(stop),
@@ -128,6 +143,7 @@ fn verdict(outcome: Outcome, level: Level) -> std::result::Result<Verdict, BusEr
         Err(Stop::Failed(deviation)) if level == Level::Recommended => Verdict::Recommended(deviation),
         Err(Stop::Failed(deviation)) => Verdict::Failed(deviation),
         Err(Stop::Skipped(reason)) => Verdict::Skipped(reason),
+        Err(Stop::Interrupted) => Verdict::Skipped(INTERRUPTED.to_owned()),
         Err(Stop::Bus(error)) => return Err(error),
     })
 }
@@ -253,22 +269,34 @@ impl Subject<'_> {
         self.need(0x1010, 1)?;
         self.need(0x1011, 1)?;
         self.reset(Command::ResetNode)?;
-        let saved = self.parameters()?;
-        self.write(0x1011, 1, b"load")?;
-        self.reset(Command::ResetNode)?;
+        let saved = self.sheltered(Self::parameters)?;
+        self.go_on()?;
+        self.sheltered(|s| {
+            s.write(0x1011, 1, b"load")?;
+            s.reset(Command::ResetNode)
+        })?;
         let kept = self.written.len();
         let done = does(self);
         // The values that the function has written need no restoring of their own: all saved values are written back
         // below.
         self.written.truncate(kept);
+        self.sheltered(|s| s.save_again(&saved))?;
+        done
+    }
+
+    /// Brings back and saves the values that were saved before the defaults were restored.
+    fn save_again(&mut self, saved: &Values) -> Outcome {
+        if self.is_interrupted() {
+            // An order to restore the defaults may wait for the next restart.
+            self.reset(Command::ResetNode)?;
+        }
         self.tidy()?;
-        let has_changed = saved != self.parameters()?;
-        let left = self.restore(&saved)?;
+        let has_changed = *saved != self.parameters()?;
+        let left = self.restore(saved)?;
         // The values that the device has accepted are saved, even if it refuses the others.
         if has_changed {
             self.write(0x1010, 1, b"save")?;
         }
-        ensure(left.is_empty(), "the saved values are taken back", left.join(", "))?;
-        done
+        ensure(left.is_empty(), "the saved values are taken back", left.join(", "))
     }
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use canopen::{Duration, NodeId};
 use clap::Args;
@@ -11,9 +13,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::replacement::Replacement;
-use super::{Failure, Session};
+use super::{Failure, Session, failure};
 use crate::check::{self, Check as Rule, Effect, Profile, Setup, Stop, Subject, Verdict, about, report};
 use crate::object::at;
+use crate::text::note;
 
 /// How long a device may take to boot.
 const BOOT: Duration = Duration::from_millis(10_000);
@@ -71,6 +74,9 @@ impl Check {
         let run = Check::try_all(session, check::Options { checks, allowed })?;
         self.write_reports(&run)?;
         Check::show(session, &run)?;
+        if run.is_interrupted {
+            return Err(Failure::Interrupted { left_behind: run.left_behind });
+        }
         match run.count("failed") {
             0 if run.left_behind.is_empty() => Ok(()),
             failed => Err(Failure::NotConforming { failed, left_behind: run.left_behind }),
@@ -129,7 +135,9 @@ impl Check {
         session.network.set_channel(node, None);
         let setup = Setup { node, sheet, timeout: session.options.timeout(), boot: BOOT };
         let bar = bar(options.checks.len());
-        let mut subject = Subject::new(&mut session.network, setup);
+        let interruption = interruption();
+        let is_interrupted = move || interruption.load(Ordering::Relaxed);
+        let mut subject = Subject::new(&mut session.network, setup).with_interruption(is_interrupted);
         let run = check::run(&mut subject, &options, |result| {
             bar.set_message(result.check.id);
             bar.inc(1);
@@ -144,6 +152,7 @@ impl Check {
                 deviation.seen
             )),
             Stop::Skipped(reason) => Failure::Usage(reason),
+            Stop::Interrupted => Failure::Interrupted { left_behind: Vec::new() },
         })
     }
 
@@ -181,6 +190,20 @@ impl Check {
         }
         session.print(&Table(run))
     }
+}
+
+/// Whether a signal has come (Ctrl-C, SIGTERM). The second one ends the program at once.
+fn interruption() -> Arc<AtomicBool> {
+    let is_interrupted = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&is_interrupted);
+    // Only one handler is possible; a program that has one already is not interrupted.
+    let _ = ctrlc::set_handler(move || {
+        if told.swap(true, Ordering::Relaxed) {
+            std::process::exit(failure::INTERRUPTED.into());
+        }
+        note("interrupted: the device gets its values back; a second Ctrl-C ends at once");
+    });
+    is_interrupted
 }
 
 /// A progress bar, which is only visible on a terminal.

@@ -29,7 +29,11 @@ Exit codes:
   8  two configurations differ (diff)
   9  the device does not conform (check)
  10  a rule of the bus is broken (rules)
- 11  the bus is not as its file says (net)";
+ 11  the bus is not as its file says (net)
+130  interrupted by Ctrl-C or SIGTERM (check)";
+
+/// The exit code of checks that the user has interrupted.
+pub(super) const INTERRUPTED: u8 = 130;
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -87,6 +91,12 @@ pub enum Failure {
     NotConforming {
         /// The number of failed checks.
         failed: usize,
+        /// The values that the device has not taken back.
+        left_behind: Vec<String>,
+    },
+    /// The user has interrupted the checks; the results until then have been printed already.
+    #[error("interrupted{}", left_words(.left_behind))]
+    Interrupted {
         /// The values that the device has not taken back.
         left_behind: Vec<String>,
     },
@@ -155,6 +165,7 @@ impl Failure {
             Failure::Usage(_) => 2,
             Failure::Different(_) => 8,
             Failure::NotConforming { .. } => 9,
+            Failure::Interrupted { .. } => INTERRUPTED,
             Failure::RulesBroken(_) => 10,
             Failure::NotAsPlanned(_) => 11,
             Failure::NotApplied(_) => 1,

@@ -36,7 +36,7 @@ pub(super) struct Read {
     #[arg(long)]
     block: bool,
 
-    /// Write the bytes to this file ("-" for the standard output) instead of printing the value.
+    /// Write the bytes of one object to this file ("-" for the standard output) instead of printing the value.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -75,6 +75,9 @@ impl Read {
         let nodes = session.options.node.list()?;
         if nodes.len() > 1 && self.out.is_some() {
             return Err(Failure::Usage("--out is for one node".to_owned()));
+        }
+        if self.objects.len() > 1 && self.out.is_some() {
+            return Err(Failure::Usage("--out is for one object".to_owned()));
         }
         let mut failures = Vec::new();
         let mut all = 0;
@@ -132,8 +135,13 @@ impl Read {
         let at = session.find(node, query)?;
         let catalogue = session.catalogue(node)?;
         let subs = catalogue.subs(at.index);
-        let is_whole = at.sub == 0 && self.out.is_none() && self.data_type.is_none() && names_no_sub(query);
-        Ok(if is_whole && subs.len() > 1 { subs } else { vec![at] })
+        let is_whole = at.sub == 0 && names_no_sub(query) && subs.len() > 1;
+        if is_whole && self.out.is_some() {
+            let words =
+                format!("--out is for one object: choose a sub-index of {:04X}h, as {0:04X}:1", at.index);
+            return Err(Failure::Usage(words));
+        }
+        Ok(if is_whole && self.data_type.is_none() { subs } else { vec![at] })
     }
 
     fn read(

@@ -131,10 +131,12 @@ impl Trace {
             for node in self.present(session)? {
                 session.begin();
                 let catalogue = session.catalogue(node)?;
-                match Knowledge::ask(&mut session.client(node), catalogue) {
+                match Knowledge::ask(&mut session.client(node), Arc::clone(&catalogue)) {
                     Ok(knowledge) => decoder.know(node, knowledge),
                     Err(error) if error.is_silence() => return Err(session.named(error)),
                     Err(error) => {
+                        // Until the trace shows other values, the defaults of the data sheet apply.
+                        decoder.know(node, Knowledge::new(catalogue));
                         let failure = session.named(error);
                         session.tell(&failure)?;
                     }

@@ -17,3 +17,4 @@ mod socket;
 pub use access::Token;
 pub use hub::{FromPage, Hub, PageId};
 pub use listen::{Options, Server, start};
+pub(crate) use socket::LARGEST;

@@ -22,6 +22,8 @@ pub struct Knowledge {
     catalogue: Arc<Catalogue>,
     /// The numbers of up to four bytes.
     numbers: BTreeMap<(u16, u8), u32>,
+    /// The objects that the node was asked for, and that have no number.
+    without: BTreeSet<(u16, u8)>,
 }
 
 impl Default for Knowledge {
@@ -36,7 +38,7 @@ impl Knowledge {
     /// apply.
     #[must_use]
     pub fn new(catalogue: impl Into<Arc<Catalogue>>) -> Knowledge {
-        Knowledge { catalogue: catalogue.into(), numbers: BTreeMap::new() }
+        Knowledge { catalogue: catalogue.into(), numbers: BTreeMap::new(), without: BTreeSet::new() }
     }
 
     /// Reads the PDOs in force from a node, and the units of their objects.
@@ -76,18 +78,40 @@ impl Knowledge {
 
     fn fetch(&mut self, client: &mut Client, at: Multiplexer) -> Result<Option<u32>, Error> {
         match client.upload(at) {
-            Ok(bytes) => {
-                self.tell(at, &bytes);
-                Ok(self.told(at))
-            }
-            Err(error) if error.abort().is_some() => Ok(None),
+            Ok(bytes) => Ok(self.answer(at, Some(&bytes))),
+            Err(error) if error.abort().is_some() => Ok(self.answer(at, None)),
             Err(error) => Err(error),
         }
     }
 
+    /// Takes the answer of the node to a request for an object; `None` where the node refuses the object. Returns its
+    /// number.
+    pub(crate) fn answer(&mut self, at: Multiplexer, bytes: Option<&[u8]>) -> Option<u32> {
+        bytes.into_iter().for_each(|bytes| self.tell(at, bytes));
+        let number = self.told(at);
+        if number.is_none() {
+            self.without.insert((at.index, at.sub));
+        }
+        number
+    }
+
+    /// The quantity of an object by the numbers of the node; `None` while the node has not told them.
+    pub(crate) fn measured(&self, of: Multiplexer) -> Option<Quantity> {
+        Quantity::by(&self.catalogue, of, |at| if self.is_asked(at) { Ok(self.told(at)) } else { Err(()) }).ok()
+    }
+
+    /// The objects that the quantity of an object depends on and that the node has not told.
+    pub(crate) fn unasked(&self, of: Multiplexer) -> impl Iterator<Item = Multiplexer> {
+        Quantity::sources(&self.catalogue, of).into_iter().filter(|at| !self.is_asked(*at))
+    }
+
+    fn is_asked(&self, at: Multiplexer) -> bool {
+        self.told(at).is_some() || self.without.contains(&(at.index, at.sub))
+    }
+
     /// Takes a value that the node has told. Values of more than four bytes and values of unknown objects are ignored,
     /// so that a trace of any length needs limited memory.
-    pub(super) fn tell(&mut self, at: Multiplexer, bytes: &[u8]) {
+    pub(crate) fn tell(&mut self, at: Multiplexer, bytes: &[u8]) {
         let is_pdo = (0x1400..0x1C00).contains(&at.index);
         if bytes.len() <= 4 && (is_pdo || self.catalogue.entry(at).is_some()) {
             let mut word = [0; 4];
@@ -118,7 +142,7 @@ impl Knowledge {
         asked.unwrap_or_default()
     }
 
-    pub(super) fn catalogue(&self) -> &Catalogue {
+    pub(crate) fn catalogue(&self) -> &Catalogue {
         &self.catalogue
     }
 

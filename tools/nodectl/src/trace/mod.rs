@@ -136,6 +136,11 @@ impl Decoder {
         self.pdos.forget(node);
     }
 
+    /// Takes a transfer of which the frames were not handed over.
+    pub(crate) fn hear(&mut self, node: NodeId, ended: &Transferred) {
+        self.pdos.note(node, self.nodes.entry(node).or_default(), ended);
+    }
+
     /// Whether a known node is a lift device.
     fn has_lift(&self) -> bool {
         self.nodes.values().any(|known| known.catalogue().device_type().is_some_and(is_lift))

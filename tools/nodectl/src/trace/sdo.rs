@@ -60,7 +60,7 @@ enum End {
 #[derive(Debug)]
 pub(crate) struct Transferred {
     pub(crate) at: Multiplexer,
-    is_write: bool,
+    pub(crate) is_write: bool,
     way: Way,
     end: End,
     data: Vec<u8>,
@@ -242,7 +242,7 @@ impl Transfer {
 
 impl Transferred {
     /// The bytes that the object has now; `None` where the transfer failed or was too long to keep.
-    pub(super) fn value(&self) -> Option<&[u8]> {
+    pub(crate) fn value(&self) -> Option<&[u8]> {
         (self.end == End::Done && self.length == self.data.len()).then_some(&self.data)
     }
 

@@ -82,6 +82,29 @@ fn several_nodes_are_read_by_one_command() {
     assert_eq!(failed(&wire, &["write", "1017", "5", "-n", "1-3"]).0, 2);
 }
 
+#[test]
+fn a_file_takes_the_bytes_of_one_object() {
+    for personality in PERSONALITIES {
+        let wire = Wire::new(vec![Pressure::of(personality, 1), Pressure::of(personality, 3)]);
+        let file = path(&format!("one-object-{personality:?}"));
+        let _ = std::fs::remove_file(&file);
+        for objects in [&["1000", "1008"][..], &["1008", "1000"], &["1018"], &["identity"], &["1600"]] {
+            for options in [&[][..], &["--block"], &["--type", "u32"]] {
+                let line = [&["read", "--out", &file], objects, options].concat();
+                let (code, text) = failed(&wire, &line);
+                assert_eq!(code, 2, "{line:?}: {text}");
+                assert!(text.contains("--out is for one object"), "{text}");
+                assert!(!std::path::Path::new(&file).exists(), "{line:?}");
+            }
+        }
+        assert_eq!(failed(&wire, &["read", "1000", "--out", &file, "-n", "1,3"]).0, 2);
+        for (object, bytes) in [("1000", 4), ("1018:0", 1), ("1018:4", 4)] {
+            printed(&wire, &["read", object, "--out", &file]);
+            assert_eq!(std::fs::read(&file).expect("a file").len(), bytes, "{object}");
+        }
+    }
+}
+
 /// A node that sends and never answers.
 struct Deaf(Frame, Instant);
 

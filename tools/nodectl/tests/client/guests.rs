@@ -13,7 +13,7 @@ fn frame(id: u16, data: [u8; 8]) -> Frame {
     Frame::new(id, &data).expect("a frame")
 }
 
-/// A node, and another client that reads 1000h from time to time. Each of its transfers takes a while.
+/// A node, and another client that reads an object from time to time. Each of its transfers takes a while.
 struct Shared {
     node: Pressure,
     /// When the next transfer begins, and when the present one ends.
@@ -21,6 +21,8 @@ struct Shared {
     end: Option<Instant>,
     /// The pause between two transfers.
     pause: Duration,
+    /// The request of the other client, and its answer.
+    transfer: [[u8; 8]; 2],
     /// Requests of this program that came into a transfer of the other client.
     collisions: usize,
 }
@@ -38,11 +40,11 @@ impl Station for Shared {
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         match self.end {
             Some(end) if now >= end => {
-                let _ = out.send(frame(0x581, [0x43, 0x00, 0x10, 0, 0x94, 1, 2, 0]));
+                let _ = out.send(frame(0x581, self.transfer[1]));
                 (self.end, self.begin) = (None, now + self.pause);
             }
             None if now >= self.begin => {
-                let _ = out.send(frame(0x601, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
+                let _ = out.send(frame(0x601, self.transfer[0]));
                 self.end = Some(now + TRANSFER);
             }
             _ => (),
@@ -51,9 +53,17 @@ impl Station for Shared {
     }
 }
 
+const DEVICE_TYPE: [[u8; 8]; 2] =
+    [[0x40, 0x00, 0x10, 0, 0, 0, 0, 0], [0x43, 0x00, 0x10, 0, 0x94, 1, 2, 0]];
+const HEARTBEAT: [[u8; 8]; 2] = [[0x40, 0x17, 0x10, 0, 0, 0, 0, 0], [0x4B, 0x17, 0x10, 0, 0xE8, 3, 0, 0]];
+
 fn shared(pause: u64) -> Wire<Shared> {
+    shared_by(pause, DEVICE_TYPE)
+}
+
+fn shared_by(pause: u64, transfer: [[u8; 8]; 2]) -> Wire<Shared> {
     let pause = Duration::from_millis(pause);
-    Wire::new(Shared { node: Pressure::new(1), begin: Instant(0), end: None, pause, collisions: 0 })
+    Wire::new(Shared { node: Pressure::new(1), begin: Instant(0), end: None, pause, transfer, collisions: 0 })
 }
 
 #[test]
@@ -68,6 +78,21 @@ fn a_request_waits_for_the_transfer_of_another_client() {
             assert_eq!(value, 1000_u16.to_le_bytes());
         }
         assert_eq!(wire.station(|shared| shared.collisions), 0, "pause of {pause} ms");
+    }
+}
+
+/// The answers to another client are no answers to the scan.
+#[test]
+fn a_scan_and_a_trace_beside_another_client_know_the_node() {
+    for (pause, transfer) in [200, 100, 50, 20].into_iter().zip([HEARTBEAT, DEVICE_TYPE].into_iter().cycle()) {
+        let wire = shared_by(pause, transfer);
+        let found =
+            nodectl::scan::scan(&mut wire.network(), Duration::from_millis(300)).expect("a bus");
+        let presence = found.get(&canopen::NodeId::new(1).expect("a node-ID")).expect("the node");
+        assert_eq!(presence.device_type, Some(0x0002_0194), "pause of {pause} ms");
+        printed(&wire, &["nmt", "start"]);
+        let lines = printed(&wire, &["trace", "--for", "3", "--kind", "pdo"]);
+        assert!(lines.contains("Pressure process value = "), "pause of {pause} ms: {lines}");
     }
 }
 

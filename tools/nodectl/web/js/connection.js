@@ -1,5 +1,7 @@
 // One WebSocket to the server: requests with their answers, events, and a new connection when the old one is lost.
 
+import { megabytes, sizeOf } from "./file.js";
+
 const RETRY_MS = 1000;
 const WENT_AWAY = "the server has gone away";
 
@@ -21,6 +23,8 @@ export class Connection extends EventTarget {
     super();
     this.#token = token;
     this.connected = false;
+    // The bytes of the largest message that the server takes.
+    this.largest = Infinity;
   }
 
   /** Connects, and connects again whenever the connection is lost. */
@@ -39,9 +43,12 @@ export class Connection extends EventTarget {
     if (!this.connected) return Promise.reject(new Refusal(WENT_AWAY));
     this.#lastId += 1;
     const id = this.#lastId;
+    const message = JSON.stringify({ id, do: what, ...keys });
+    // The server closes the connection of a page that sends a larger message.
+    if (sizeOf(message) > this.largest) return Promise.reject(new Refusal(`the request is too large: the server takes ${megabytes(this.largest)}`));
     return new Promise((resolve, reject) => {
       this.#open.set(id, { resolve, reject, onProgress });
-      this.#socket.send(JSON.stringify({ id, do: what, ...keys }));
+      this.#socket.send(message);
     });
   }
 
@@ -64,7 +71,7 @@ export class Connection extends EventTarget {
   #tell(message) {
     // The first message shows that the server has accepted the connection.
     const isFirst = message.event === "hello";
-    if (isFirst) this.connected = true;
+    if (isFirst) Object.assign(this, { connected: true, largest: message.largest });
     this.dispatchEvent(new CustomEvent(message.event, { detail: message }));
     if (isFirst) this.#tellConnected();
   }

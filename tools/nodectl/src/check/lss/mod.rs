@@ -64,9 +64,12 @@ fn selected(s: &mut Subject<'_>, does: impl FnOnce(&mut Subject<'_>) -> Outcome)
         }
         None => return Err(skip("the device is no LSS slave: nothing answers to its identity")),
     }
-    let done = does(s);
-    release(s)?;
-    done
+    // Requests of LSS are short, and the device may not stay selected or with another pending node-ID.
+    s.sheltered(|s| {
+        let done = does(s);
+        release(s)?;
+        done
+    })
 }
 
 /// Sends a request and demands a response.

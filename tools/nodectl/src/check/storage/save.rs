@@ -50,9 +50,11 @@ fn keeps(
         s.unlock_counter()?;
     }
     let is_kept = saved_and_restarted(s, (index, sub), bytes, group, restart);
-    s.put_back_since(kept)?;
-    s.try_write(0x1010, group, b"save")?
-        .map_err(|refusal| fail("the former value is saved again", refusal))?;
+    s.sheltered(|s| {
+        s.put_back_since(kept)?;
+        s.try_write(0x1010, group, b"save")?
+            .map_err(|refusal| fail("the former value is saved again", refusal))
+    })?;
     is_kept
 }
 

@@ -6,6 +6,9 @@ use super::Subject;
 use super::verdict::{Outcome, skip};
 use crate::Logged;
 
+/// The time between two looks whether the run is interrupted.
+const LOOK: Duration = Duration::from_millis(100);
+
 /// A place in the log of the bus.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::check) struct Mark(usize);
@@ -18,7 +21,15 @@ impl Subject<'_> {
 
     /// Lets `ms` milliseconds pass.
     pub(in crate::check) fn pass(&mut self, ms: u64) -> Outcome {
-        self.network.pause(Duration::from_millis(ms))?;
+        let end = self.network.now() + Duration::from_millis(ms);
+        loop {
+            self.go_on()?;
+            let left = Duration(end.0.saturating_sub(self.network.now().0));
+            self.network.pause(left.min(LOOK))?;
+            if left <= LOOK {
+                break;
+            }
+        }
         self.network.forget();
         Ok(())
     }
@@ -65,10 +76,12 @@ impl Subject<'_> {
             if let Some(heard) = self.heard(mark, id).first() {
                 return Ok(Some(*heard));
             }
-            if self.network.now() >= until {
+            self.go_on()?;
+            let now = self.network.now();
+            if now >= until {
                 return Ok(None);
             }
-            self.network.wait(until, |frame| (frame.id() == id).then_some(()))?;
+            self.network.wait(until.min(now + LOOK), |frame| (frame.id() == id).then_some(()))?;
             self.network.forget();
         }
     }

@@ -69,6 +69,12 @@ impl Subject<'_> {
 
     /// Restarts the device or its communication, and waits for the boot-up message.
     pub(in crate::check) fn reset(&mut self, command: Command) -> Outcome {
+        self.go_on()?;
+        // A device that boots could not get its values back.
+        self.sheltered(|s| s.reset_and_wait(command))
+    }
+
+    fn reset_and_wait(&mut self, command: Command) -> Outcome {
         let (mark, id, time) = (self.mark(), self.error_control(), self.setup.boot.0 / 1000);
         self.command(command)?;
         let until = self.network.now().0 / 1000 + time;

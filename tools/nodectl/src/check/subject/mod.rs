@@ -47,12 +47,49 @@ pub struct Subject<'n> {
     pub(super) may_store: bool,
     /// Whether other nodes were heard on the bus. Then no frames for all nodes are sent.
     has_company: bool,
+    /// Whether the user has interrupted the run.
+    is_interrupted: Box<dyn Fn() -> bool + 'n>,
+    /// Whether the run cannot be interrupted now, because the device gets its values back.
+    is_sheltered: bool,
 }
 
 impl<'n> Subject<'n> {
     /// The device with this node-ID.
     pub fn new(network: &'n mut Network, setup: Setup) -> Subject<'n> {
-        Subject { network, setup, written: Vec::new(), may_store: false, has_company: false }
+        Subject {
+            network,
+            setup,
+            written: Vec::new(),
+            may_store: false,
+            has_company: false,
+            is_interrupted: Box::new(|| false),
+            is_sheltered: false,
+        }
+    }
+
+    /// Sets the function that tells whether the user has interrupted the run. An interrupted check ends at once, and the
+    /// device gets its values back.
+    #[must_use]
+    pub fn with_interruption(self, is_interrupted: impl Fn() -> bool + 'n) -> Subject<'n> {
+        Subject { is_interrupted: Box::new(is_interrupted), ..self }
+    }
+
+    /// Whether the user has interrupted the run.
+    pub(in crate::check) fn is_interrupted(&self) -> bool {
+        (self.is_interrupted)()
+    }
+
+    /// Ends the check if the user has interrupted the run.
+    pub(in crate::check) fn go_on(&self) -> Outcome {
+        if self.is_interrupted() && !self.is_sheltered { Err(Stop::Interrupted) } else { Ok(()) }
+    }
+
+    /// Runs a function that an interruption does not end.
+    pub(in crate::check) fn sheltered<T>(&mut self, does: impl FnOnce(&mut Self) -> T) -> T {
+        let before = std::mem::replace(&mut self.is_sheltered, true);
+        let done = does(self);
+        self.is_sheltered = before;
+        done
     }
 
     /// The node-ID.

@@ -85,7 +85,7 @@ impl Subject<'_> {
         // In reverse order, the first value of an object replaces the later ones.
         let former =
             written.into_iter().rev().map(|(Multiplexer { index, sub }, bytes)| ((index, sub), bytes));
-        let left = self.bring(&former.collect())?;
+        let left = self.sheltered(|s| s.bring(&former.collect()))?;
         ensure(left.is_empty(), "what was changed is taken back", left.join(", "))
     }
 

@@ -109,6 +109,7 @@ impl Subject<'_> {
         index: u16,
         sub: u8,
     ) -> Outcome<std::result::Result<Vec<u8>, Refusal>> {
+        self.go_on()?;
         let result = self.client().upload(at(index, sub));
         judged(result, "a correct upload")
     }

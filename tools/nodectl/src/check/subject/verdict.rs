@@ -20,6 +20,8 @@ pub enum Stop {
     Skipped(String),
     /// The bus is lost.
     Bus(BusError),
+    /// The user has interrupted the run.
+    Interrupted,
 }
 
 /// The outcome of a check: `Ok` where the device follows the rule.

@@ -10,12 +10,16 @@ use serde_json::{Value as Json, json};
 
 use crate::acquisition::{Kind, Signal};
 use crate::object::at;
+use crate::quantity::Quantity;
 use crate::tpdo::Tpdo;
+use crate::trace::Knowledge;
 use crate::value::Value;
 use crate::{Catalogue, meaning};
 
 /// The number of samples of a signal between two events: more than one TPDO can bring in this time at 1 Mbit/s.
 const SAMPLES: usize = 4096;
+/// A signal without a sample from its TPDO for this time is read by SDO for the pages that want it, in seconds.
+const RARE: f64 = 2.0;
 
 /// Names a signal: node and object, `5:6130:1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -56,12 +60,12 @@ impl fmt::Display for Key {
     }
 }
 
-/// The TPDOs and signals of a node.
+/// The TPDOs and signals of a node, and the numbers that their units depend on.
 #[derive(Clone, Default)]
 pub(super) struct Survey {
     pub(super) tpdos: Vec<Tpdo>,
     pub(super) signals: Vec<Signal>,
-    pub(super) catalogue: Option<std::sync::Arc<Catalogue>>,
+    pub(super) knowledge: Knowledge,
 }
 
 impl Survey {
@@ -69,12 +73,26 @@ impl Survey {
     pub(super) fn describe(&self, node: NodeId) -> Vec<Json> {
         self.signals.iter().map(|signal| shape(Key::new(node, signal.at), signal)).collect()
     }
+
+    /// The signal of an object, in a TPDO or read by SDO.
+    fn signal(&self, object: Multiplexer) -> Signal {
+        let found = self.signals.iter().find(|signal| signal.at == object).cloned();
+        found.unwrap_or_else(|| {
+            let mut signal = Signal::read(object, self.knowledge.catalogue());
+            if let Some(quantity) = self.knowledge.measured(object) {
+                signal.measure(quantity);
+            }
+            signal
+        })
+    }
 }
 
 /// A signal that a page follows.
 struct Track {
     signal: Signal,
     samples: Vec<(f64, Value)>,
+    /// The time of the newest sample from a TPDO.
+    newest: Option<f64>,
 }
 
 /// All signals that pages follow.
@@ -82,6 +100,8 @@ struct Track {
 pub(super) struct Live {
     surveys: BTreeMap<NodeId, Survey>,
     wanted: BTreeSet<Key>,
+    /// The followed signals that are read by SDO while their TPDO does not come.
+    read: BTreeSet<Key>,
     tracks: BTreeMap<Key, Track>,
     /// The TPDOs that carry a followed signal, by CAN-ID.
     tpdos: HashMap<u16, Vec<(NodeId, Tpdo)>>,
@@ -111,9 +131,9 @@ impl Live {
         self.surveys.remove(&node);
     }
 
-    /// Sets the signals to follow, instead of the former ones.
-    pub(super) fn want(&mut self, wanted: BTreeSet<Key>) {
-        self.wanted = wanted;
+    /// Sets the signals to follow, and those of them to read by SDO while their TPDO does not come.
+    pub(super) fn want(&mut self, wanted: BTreeSet<Key>, read: BTreeSet<Key>) {
+        (self.wanted, self.read) = (wanted, read);
         self.arrange();
     }
 
@@ -122,10 +142,52 @@ impl Live {
         self.wanted.iter().map(|key| key.node).collect()
     }
 
-    /// The followed signals of a node that no TPDO carries.
-    pub(super) fn polled(&self, node: NodeId) -> Vec<Multiplexer> {
-        let is_polled = |key: &&Key| self.tracks.get(key).is_some_and(|track| track.signal.tpdo.is_none());
-        self.wanted.iter().filter(|key| key.node == node).filter(is_polled).map(|key| key.at()).collect()
+    /// The followed signals of a node that no TPDO brings.
+    pub(super) fn polled(&self, node: NodeId, t: f64) -> Vec<Multiplexer> {
+        let is_rare = |track: &Track| track.newest.is_none_or(|newest| t - newest > RARE);
+        let is_polled =
+            |key: &Key, track: &Track| track.is_polled() || self.read.contains(key) && is_rare(track);
+        let tracks = self.tracks.iter().filter(|(key, track)| key.node == node && is_polled(key, track));
+        tracks.map(|(key, _)| key.at()).collect()
+    }
+
+    /// The objects that the units of the followed signals depend on and that the node has not told.
+    pub(super) fn unasked(&self, node: NodeId) -> BTreeSet<(u16, u8)> {
+        let Some(survey) = self.surveys.get(&node) else { return BTreeSet::new() };
+        let tracks = self.tracks.keys().filter(|key| key.node == node);
+        tracks.flat_map(|key| survey.knowledge.unasked(key.at())).map(|at| (at.index, at.sub)).collect()
+    }
+
+    /// Takes the value of an object that a transfer of any client has shown. Returns whether a signal has another unit
+    /// or scale.
+    pub(super) fn hear(&mut self, node: NodeId, object: Multiplexer, bytes: &[u8]) -> bool {
+        let Some(survey) = self.surveys.get_mut(&node) else { return false };
+        survey.knowledge.tell(object, bytes);
+        self.measure(node, object)
+    }
+
+    /// Takes the answer to a request for an object of [`Live::unasked`]; `None` where the node refuses it.
+    pub(super) fn answer(&mut self, node: NodeId, object: Multiplexer, bytes: Option<&[u8]>) -> bool {
+        let Some(survey) = self.surveys.get_mut(&node) else { return false };
+        survey.knowledge.answer(object, bytes);
+        self.measure(node, object)
+    }
+
+    /// Renews the units and scales that depend on an object. Returns whether one is new.
+    fn measure(&mut self, node: NodeId, source: Multiplexer) -> bool {
+        let Some(Survey { signals, knowledge, .. }) = self.surveys.get_mut(&node) else { return false };
+        let new = |of: Multiplexer| {
+            let depends = Quantity::sources(knowledge.catalogue(), of).contains(&source);
+            if depends { knowledge.measured(of) } else { None }
+        };
+        let mut is_new = false;
+        for signal in signals {
+            new(signal.at).into_iter().for_each(|quantity| is_new |= signal.measure(quantity));
+        }
+        for (key, track) in self.tracks.iter_mut().filter(|(key, _)| key.node == node) {
+            new(key.at()).into_iter().for_each(|quantity| is_new |= track.measure(quantity));
+        }
+        is_new
     }
 
     /// Assigns the followed signals to TPDOs. The signals of a node without a survey stay unchanged.
@@ -134,11 +196,10 @@ impl Live {
         self.tracks.retain(|key, _| wanted.contains(key));
         for &key in &wanted {
             let Some(survey) = self.surveys.get(&key.node) else { continue };
-            let found = survey.signals.iter().find(|signal| signal.at == key.at());
-            let signal = found.cloned().unwrap_or_else(|| unmapped(survey, key.at()));
+            let signal = survey.signal(key.at());
             match self.tracks.get_mut(&key) {
-                Some(track) => track.signal = signal,
-                None => drop(self.tracks.insert(key, Track { signal, samples: Vec::new() })),
+                Some(track) => track.change(signal),
+                None => drop(self.tracks.insert(key, Track { signal, samples: Vec::new(), newest: None })),
             }
         }
         self.tpdos.clear();
@@ -162,6 +223,7 @@ impl Live {
                 let Some(track) = self.tracks.get_mut(&Key::new(*node, object)) else { continue };
                 if track.signal.tpdo == Some(tpdo.number) {
                     let value = track.signal.decode(&bytes);
+                    track.newest = Some(t);
                     self.lost += u64::from(!track.push(t, value));
                 }
             }
@@ -170,7 +232,8 @@ impl Live {
 
     /// Takes a sample that was read by SDO.
     pub(super) fn on_reading(&mut self, key: Key, t: f64, bytes: &[u8]) {
-        if let Some(track) = self.tracks.get_mut(&key).filter(|track| track.signal.tpdo.is_none()) {
+        let is_read = self.read.contains(&key);
+        if let Some(track) = self.tracks.get_mut(&key).filter(|track| track.is_polled() || is_read) {
             let value = track.signal.decode(bytes);
             self.lost += u64::from(!track.push(t, value));
         }
@@ -181,7 +244,7 @@ impl Live {
         let surveys = &self.surveys;
         let batches =
             self.tracks.iter_mut().filter(|(_, track)| !track.samples.is_empty()).map(|(key, track)| {
-                let catalogue = surveys.get(&key.node).and_then(|survey| survey.catalogue.as_deref());
+                let catalogue = surveys.get(&key.node).map(|survey| survey.knowledge.catalogue());
                 (*key, track.batch(*key, catalogue))
             });
         (batches.collect(), std::mem::take(&mut self.lost))
@@ -189,9 +252,7 @@ impl Live {
 
     /// A signal in the form for pages; `None` without a survey of its node.
     pub(super) fn describe(&self, key: Key) -> Option<Json> {
-        let survey = self.surveys.get(&key.node)?;
-        let found = survey.signals.iter().find(|signal| signal.at == key.at());
-        Some(shape(key, &found.cloned().unwrap_or_else(|| unmapped(survey, key.at()))))
+        self.surveys.get(&key.node).map(|survey| shape(key, &survey.signal(key.at())))
     }
 
     /// The signals that a node sends.
@@ -201,6 +262,26 @@ impl Live {
 }
 
 impl Track {
+    /// Whether no TPDO carries the signal.
+    fn is_polled(&self) -> bool {
+        self.signal.tpdo.is_none()
+    }
+
+    /// Sets the signal. Waiting samples in another unit are dropped.
+    fn change(&mut self, signal: Signal) {
+        if self.signal.unit != signal.unit {
+            self.samples.clear();
+        }
+        self.signal = signal;
+    }
+
+    fn measure(&mut self, quantity: Quantity) -> bool {
+        let mut signal = self.signal.clone();
+        let is_new = signal.measure(quantity);
+        self.change(signal);
+        is_new
+    }
+
     fn push(&mut self, t: f64, value: Value) -> bool {
         let fits = self.samples.len() < SAMPLES;
         if fits {
@@ -222,11 +303,6 @@ impl Track {
         }
         Batch { json: json.to_string(), samples: samples.len() as u64 }
     }
-}
-
-fn unmapped(survey: &Survey, object: Multiplexer) -> Signal {
-    let unknown = || Signal::polled(object, "", "");
-    survey.catalogue.as_deref().map_or_else(unknown, |catalogue| Signal::read(object, catalogue))
 }
 
 fn shape(key: Key, signal: &Signal) -> Json {
@@ -267,7 +343,7 @@ mod tests {
             signal
         };
         let signals = mapping.iter().map(signal).collect();
-        Survey { tpdos: vec![Tpdo { number: 1, id: 0x185, mapping }], signals, catalogue: None }
+        Survey { tpdos: vec![Tpdo { number: 1, id: 0x185, mapping }], signals, knowledge: Knowledge::default() }
     }
 
     fn node() -> NodeId {
@@ -278,7 +354,7 @@ mod tests {
     fn every_sample_of_a_followed_signal_comes_once() {
         let mut live = Live::default();
         live.learn(node(), survey(&[(0x2000, 1, 8), (0x2000, 2, 8)]));
-        live.want(BTreeSet::from([Key::new(node(), at(0x2000, 2))]));
+        live.want(BTreeSet::from([Key::new(node(), at(0x2000, 2))]), BTreeSet::new());
         live.on_frame(&Frame::new(0x185, &[1, 2]).unwrap(), 0.5);
         live.on_frame(&Frame::new(0x185, &[3, 4]).unwrap(), 0.75);
         live.on_frame(&Frame::new(0x186, &[3, 4]).unwrap(), 0.75);
@@ -293,13 +369,71 @@ mod tests {
     fn a_new_mapping_is_followed_and_unmapped_signals_are_polled() {
         let mut live = Live::default();
         live.learn(node(), survey(&[(0x2000, 1, 8), (0x2000, 2, 8)]));
-        live.want(BTreeSet::from([Key::new(node(), at(0x2000, 1)), Key::new(node(), at(0x2000, 2))]));
+        live.want(
+            BTreeSet::from([Key::new(node(), at(0x2000, 1)), Key::new(node(), at(0x2000, 2))]),
+            BTreeSet::new(),
+        );
         live.learn(node(), survey(&[(0x2000, 2, 8)]));
         live.on_frame(&Frame::new(0x185, &[9]).unwrap(), 1.0);
         let (batches, _) = live.take();
         assert_eq!(batches.values().next().unwrap().json, r#"{"signal":"5:2000:2","t":[1.0],"v":[9]}"#);
-        assert_eq!(live.polled(node()), [at(0x2000, 1)]);
+        assert_eq!(live.polled(node(), 1.0), [at(0x2000, 1)]);
         live.on_reading(Key::new(node(), at(0x2000, 1)), 2.0, &[7]);
         assert_eq!(live.take().0.len(), 1);
+    }
+
+    #[test]
+    fn a_signal_is_read_for_a_page_that_wants_it_while_its_tpdo_does_not_come() {
+        let (mut live, key) = (Live::default(), Key::new(node(), at(0x2000, 1)));
+        live.learn(node(), survey(&[(0x2000, 1, 8)]));
+        live.want(BTreeSet::from([key]), BTreeSet::from([key]));
+        assert_eq!(live.polled(node(), 0.0), [at(0x2000, 1)]);
+        live.on_reading(key, 0.1, &[7]);
+        live.on_frame(&Frame::new(0x185, &[9]).unwrap(), 1.0);
+        assert_eq!(live.polled(node(), 2.9), []);
+        assert_eq!(live.polled(node(), 3.1), [at(0x2000, 1)]);
+        assert_eq!(live.take().0[&key].json, r#"{"signal":"5:2000:1","t":[0.1,1.0],"v":[7,9]}"#);
+        live.want(BTreeSet::from([key]), BTreeSet::new());
+        live.on_reading(key, 3.2, &[7]);
+        assert!(live.polled(node(), 9.0).is_empty() && live.take().0.is_empty());
+    }
+
+    /// The unit of an object, its decimal digits or its step, as another client writes them, on all devices.
+    #[test]
+    fn a_unit_on_the_bus_is_used_from_then_on() {
+        const BAR: u32 = 0x004E_0000;
+        const KILOPASCAL: u32 = 0x0322_0000;
+        for (product, of, numbers, former, new) in [
+            (1, 0x7130, [(0x6131, BAR, KILOPASCAL), (0x6132, 2, 1)], ("bar", 2.5), ("kPa", 25.0)),
+            (3, 0x7930, [(0x6931, BAR, KILOPASCAL), (0x6932, 2, 1)], ("bar", 2.5), ("kPa", 25.0)),
+            (4, 0x6383, [(0x6384, 100, 50), (0x6384, 100, 50)], ("mm", 250.0), ("mm", 125.0)),
+        ] {
+            let catalogue = Catalogue::built_in(profiles::product::VENDOR_ID, product).expect("a device");
+            let (mut live, key) = (Live::default(), Key::new(node(), at(of, 1)));
+            live.learn(node(), Survey { knowledge: Knowledge::new(catalogue), ..Survey::default() });
+            live.want(BTreeSet::from([key]), BTreeSet::new());
+            let unit = |live: &Live| live.describe(key).expect("a survey")["unit"].as_str().map(str::to_owned);
+            let sample = |live: &mut Live| {
+                live.on_reading(key, 1.0, &250_u32.to_le_bytes());
+                let json: Json = serde_json::from_str(&live.take().0[&key].json).expect("JSON");
+                json["v"][0].as_f64()
+            };
+            assert_eq!(unit(&live).as_deref(), Some(""), "no unit until the node has told it");
+            let asked: BTreeSet<_> = numbers.iter().map(|(index, ..)| (*index, 1)).collect();
+            assert_eq!(live.unasked(node()), asked);
+            for (index, number, _) in numbers {
+                live.answer(node(), at(index, 1), Some(&u32::to_le_bytes(number)));
+            }
+            assert_eq!((unit(&live).as_deref(), sample(&mut live)), (Some(former.0), Some(former.1)));
+            assert!(live.unasked(node()).is_empty());
+            live.on_reading(key, 1.0, &250_u32.to_le_bytes());
+            for (index, _, number) in numbers {
+                live.hear(node(), at(index, 1), &u32::to_le_bytes(number));
+            }
+            assert_eq!(live.take().0.is_empty(), former.0 != new.0, "samples in the former unit are dropped");
+            assert_eq!((unit(&live).as_deref(), sample(&mut live)), (Some(new.0), Some(new.1)));
+            assert!(!live.hear(node(), at(numbers[0].0, 1), &u32::to_le_bytes(numbers[0].2)), "nothing new");
+            assert!(!live.hear(node(), at(0x1017, 0), &[1, 0]), "no unit");
+        }
     }
 }

@@ -27,6 +27,8 @@ pub(super) struct Page {
     pub(super) writes: bool,
     pub(super) trace: Option<Filter>,
     pub(super) follows: BTreeSet<Key>,
+    /// The followed signals that are read by SDO while their TPDO does not come.
+    pub(super) reads: BTreeSet<Key>,
     /// The file that the page has last sent for an update, with its number.
     pub(super) file: Option<(u64, Vec<u8>)>,
     requests: usize,
@@ -96,6 +98,10 @@ impl Pages {
 
     pub(super) fn follows(&self) -> BTreeSet<Key> {
         self.0.values().flat_map(|page| page.follows.iter().copied()).collect()
+    }
+
+    pub(super) fn reads(&self) -> BTreeSet<Key> {
+        self.0.values().flat_map(|page| page.reads.iter().copied()).collect()
     }
 
     pub(super) fn have_trace(&self) -> bool {

@@ -93,6 +93,8 @@ pub(super) enum What {
     },
     Follow {
         signals: Vec<String>,
+        #[serde(default)]
+        read: Vec<String>,
     },
     Dictionary {
         node: Node,

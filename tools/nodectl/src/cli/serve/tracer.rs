@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::Catalogue;
 use crate::text::hex_digits;
-use crate::trace::{Decoder, Kind, Knowledge, Line, Shown};
+use crate::trace::{Decoder, Kind, Knowledge, Line, Shown, Transferred};
 use crate::value::Value;
 
 /// The number of rows between two events; further rows are only counted. A bus at 1 Mbit/s has 450 frames in this time.
@@ -61,6 +61,11 @@ impl Tracer {
     /// Takes the values that a survey has read from a node.
     pub(super) fn learn(&mut self, node: NodeId, knowledge: Knowledge) {
         self.decoder.know(node, knowledge);
+    }
+
+    /// Takes the value in a transfer, so that a later trace decodes with it.
+    pub(super) fn hear(&mut self, node: NodeId, ended: &Transferred) {
+        self.decoder.hear(node, ended);
     }
 
     /// Takes a frame from the bus, or one that this program has sent.

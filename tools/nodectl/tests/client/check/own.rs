@@ -1,7 +1,9 @@
 //! Tests that the personalities of this project conform, each with its profile.
 
+use canopen::Duration;
 use node::Personality;
-use nodectl::check::Profile;
+use nodectl::bus::Bus;
+use nodectl::check::{self, Profile, Run, Setup, Subject};
 
 use super::{complaints, judge};
 use crate::commands::printed;
@@ -67,4 +69,52 @@ fn a_configured_node_conforms_and_keeps_what_it_has_saved() {
         printed(&wire, &["nmt", "reset", "--node", "5"]);
         assert_eq!(dump(), before, "what was saved is saved, {settings:?}");
     }
+}
+
+/// An interruption at any time: while a check listens, while it has changed PDOs, and while it has restored the defaults.
+#[test]
+fn an_interrupted_run_leaves_what_the_node_had() {
+    for (device, step) in eds::DEVICES.iter().zip([1_700, 1_900, 2_300, 2_900]) {
+        let wire = Wire::new(Pressure::of(device.personality, 5));
+        if device.personality == Personality::Lift {
+            printed(&wire, &["write", "--node", "5", "2305", "15"]);
+        }
+        printed(&wire, &["write", "--node", "5", "1017", "700"]);
+        printed(&wire, &["save", "--node", "5"]);
+        let dump = || printed(&wire, &["dump", "--node", "5"]);
+        let before = dump();
+        let mut interrupted = 0;
+        for only in ["PDO", "STO", "EMC", "ERR"] {
+            for time in (0..60).map(|number| number * step) {
+                let run = interrupted_run(&wire, device, only, time);
+                assert_eq!((run.count("failed"), &run.left_behind[..]), (0, &[][..]), "{only} at {time} ms");
+                assert_eq!(dump(), before, "{:?}, {only} at {time} ms", device.personality);
+                printed(&wire, &["nmt", "reset", "--node", "5"]);
+                assert_eq!(dump(), before, "saved, {:?}, {only} at {time} ms", device.personality);
+                if !run.is_interrupted {
+                    break;
+                }
+                interrupted += 1;
+            }
+        }
+        assert!(interrupted > 20, "{:?}: {interrupted} runs were interrupted", device.personality);
+    }
+}
+
+/// Runs some checks, and interrupts them after a time on the bus.
+fn interrupted_run(wire: &Wire<Pressure>, device: &eds::Device, only: &str, time: u64) -> Run {
+    let clock = wire.clone();
+    let end = clock.now() + Duration::from_millis(time);
+    let mut network = wire.network();
+    let setup = Setup {
+        node: canopen::NodeId::new(5).expect("a node-ID"),
+        sheet: Some(device.eds().clone()),
+        timeout: Duration::from_millis(500),
+        boot: Duration::from_millis(2000),
+    };
+    let mut checks = check::all(Some(profile(device.personality)));
+    checks.retain(|check| check.is_meant(only));
+    let options = check::Options { checks, allowed: check::Effect::Stores };
+    let mut subject = Subject::new(&mut network, setup).with_interruption(move || clock.now() >= end);
+    check::run(&mut subject, &options, |_| ()).expect("a run")
 }

@@ -7,6 +7,7 @@ import { Edits, objectField, readAll, write } from "../parts/objects.js";
 import { arc, point } from "./dial.js";
 
 const CAMS = 8;
+const COLUMNS = ["On", "Inverted", "Low", "High", "Hysteresis"];
 const [UNITS, RANGE, PRESET, POSITION] = [0x6001, 0x6002, 0x6003, 0x6004];
 const [STATES, ENABLES, POLARITIES, LOW, HIGH, HYSTERESIS] = [0x6300, 0x6301, 0x6302, 0x6310, 0x6320, 0x6330];
 
@@ -51,8 +52,8 @@ export class Encoder {
 
   #layout() {
     const scale = select([["turn", "one revolution"], ["range", "the whole range"]], "turn", (value) => ((this.scale = value), this.draw()));
-    const head = ["Cam", "On", "Inverted", "Low", "High", "Hysteresis"].map((name) => el("th", { scope: "col" }, name));
-    const table = el("table", { class: "cams" }, el("caption", { class: "unseen" }, "Cams of channel 1"), el("thead", {}, el("tr", {}, head)), el("tbody", {}, this.rows.map(({ element }) => element)));
+    const head = ["Cam", ...COLUMNS].map((name) => el("th", { scope: "col" }, name));
+    const table = el("table", { class: "cams cards" }, el("caption", { class: "unseen" }, "Cams of channel 1"), el("thead", {}, el("tr", {}, head)), el("tbody", {}, this.rows.map(({ element }) => element)));
     return el("section", { class: "box", "aria-labelledby": "encoder-title" }, el("h3", { id: "encoder-title" }, "Encoder"),
       el("div", { class: "bar" }, this.position), this.preset.element, el("h4", {}, "Cams of channel 1"),
       el("div", { class: "split" }, el("div", {}, this.dial, field("Dial", scale)), el("div", { class: "wide" }, table)), el("div", { class: "bar" }, this.writing), this.result.line);
@@ -77,7 +78,7 @@ export class Encoder {
     const control = (name, type, edited) => el("input", { type, disabled: true, "aria-label": `Cam ${at + 1} ${name}`, on: { input: ({ target }) => this.#edit(at, name, edited(target)) } });
     const boxes = ["on", "inverted"].map((name) => [name, control(name, "checkbox", ({ checked }) => Number(checked))]);
     const limits = ["low", "high", "hysteresis"].map((name) => [name, control(name, "number", ({ value }) => Number(value))]);
-    const cells = [...boxes, ...limits].map(([, input]) => el("td", {}, input));
+    const cells = [...boxes, ...limits].map(([, input], column) => el("td", { "data-label": COLUMNS[column] }, input));
     return { element: el("tr", {}, el("th", { scope: "row" }, String(at + 1)), cells), boxes, limits };
   }
 

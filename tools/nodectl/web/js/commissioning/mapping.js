@@ -41,13 +41,14 @@ export class Mapping {
     this.type = el("input", { type: "number", min: 0, max: 255 });
     this.event = el("input", { type: "number", min: 0, max: 65535 });
     this.inhibit = el("input", { type: "number", min: 0, max: 65535 });
+    this.numbers = [this.type, this.event, this.inhibit];
     const head = HEAD.map((name) => el("th", { scope: "col" }, name));
     const table = el("table", { class: "pdos cards" }, el("caption", { class: "unseen" }, "PDOs"), el("thead", {}, el("tr", {}, head)), this.list);
     return el("section", { class: "box", "aria-labelledby": "mapping-title" }, el("h3", { id: "mapping-title" }, "PDO mapping"),
       el("div", { class: "wide" }, table),
       el("div", { class: "bar" }, field("PDO", this.choice), field("Transmission type", this.type), field("Event timer, ms", this.event), field("Inhibit time, 100 us", this.inhibit)),
       el("div", { class: "slots" }, this.slots.map((slot, at) => field(`Object ${at + 1}`, slot))), this.bits,
-      el("div", { class: "bar" }, button("Map", () => this.#map()), button("Switch off", () => this.#send([]))), this.steps, this.result.line);
+      el("div", { class: "bar" }, button("Map", () => this.#map()), button("Switch off", () => this.#send({ objects: [] }))), this.steps, this.result.line);
   }
 
   #fillList() {
@@ -88,19 +89,23 @@ export class Mapping {
   }
 
   #map() {
-    return this.#send(this.#objects());
+    const objects = this.#objects();
+    if (objects.length === 0) return this.result.bad("Choose an object. \"Switch off\" ends the transmission of a PDO.");
+    const wrong = this.numbers.find(({ validity, value }) => !validity.valid || value === "");
+    if (wrong) return (wrong.focus(), this.result.bad(`${wrong.labels[0].innerText}: a whole number from ${wrong.min} to ${wrong.max}`));
+    const [transmission, event, inhibit] = this.numbers.map(({ value }) => Number(value));
+    return this.#send({ objects, transmission, event, ...(this.#pdo.direction === "tpdo" ? { inhibit } : {}) });
   }
 
-  async #send(objects) {
+  async #send(settings) {
     const { direction, number } = this.#pdo;
-    const keys = { node: this.bus.chosen, direction, number, objects, transmission: Number(this.type.value), event: Number(this.event.value) };
-    if (direction === "tpdo") keys.inhibit = Number(this.inhibit.value);
+    const keys = { node: this.bus.chosen, direction, number, ...settings };
     this.#mark(0);
     const pdo = await this.result.of("mapping", this.bus.request("map", keys), (pdo) => `${title(pdo)}: ${pdo.objects.length} objects, ${pdo.bits} bits, ${pdo.on ? "on" : "off"}`);
     if (!pdo) return;
     this.pdos = this.pdos.map((old) => (old.direction === direction && old.number === number ? pdo : old));
     this.#fillList();
-    this.#mark(objects.length ? STEPS.length : 2);
+    this.#mark(settings.objects.length ? STEPS.length : 2);
   }
 
   /** Ticks off the steps that are done. */

@@ -1,7 +1,7 @@
 // Configuration files: saving the node's configuration as a DCF, and writing a DCF to the node.
 
 import { button, el, field } from "../dom.js";
-import { offer } from "../file.js";
+import { offer, textOf } from "../file.js";
 import { address, hex } from "../format.js";
 import { outcome } from "../outcome.js";
 
@@ -34,8 +34,11 @@ function saved({ name, left_out: out }) {
 
 /** Shows the changes first; nothing is written before the user has seen them. */
 async function compare(bus, file, { result, plan, steps, onApplied }) {
-  const keys = { node: bus.chosen, text: await file.text() };
+  const node = bus.chosen;
   plan.replaceChildren();
+  const text = await result.of(`reading ${file.name}`, textOf(file, bus.connection.largest, "a configuration file (DCF)"), "");
+  if (text === undefined) return;
+  const keys = { node, text };
   const said = ({ changes }) => (changes.length ? `${objects(changes.length)} would change` : "the node is configured like this already");
   const answer = await result.of(`comparing ${file.name}`, bus.request("apply", { ...keys, dry_run: true }, steps), said);
   if (!answer) return;

@@ -15,15 +15,16 @@ export class Recorder extends EventTarget {
     bus.on("status", ({ t }) => this.#advance(t));
     bus.on("restart", () => this.#restart());
     bus.on("connected", () => bus.connection.connected && this.#follow());
+    bus.connection.on("mapping", ({ node }) => this.#keys().some((key) => key.startsWith(`${node}:`)) && this.#follow());
   }
 
   on(name, listener) {
     this.addEventListener(name, ({ detail }) => listener(detail));
   }
 
-  /** Sets the signals that one view follows, instead of its former ones. */
-  async want(view, keys) {
-    this.wishes.set(view, keys);
+  /** Sets the signals that one view follows, instead of its former ones; with `isRead`, they are read while their TPDO does not come. */
+  async want(view, keys, isRead = false) {
+    this.wishes.set(view, { keys, isRead });
     await this.#follow();
   }
 
@@ -35,10 +36,20 @@ export class Recorder extends EventTarget {
 
   async #follow() {
     if (!this.bus.connection.connected) return;
-    const keys = [...new Set([...this.wishes.values()].flat())];
-    const { signals } = await this.bus.request("follow", { signals: keys });
-    for (const signal of signals) this.signals.set(signal.signal, signal);
+    const { signals } = await this.bus.request("follow", { signals: this.#keys(), read: this.#keys(({ isRead }) => isRead) });
+    for (const signal of signals) this.#describe(signal);
     this.#tell("signals");
+  }
+
+  #keys(filter = () => true) {
+    return [...new Set([...this.wishes.values()].filter(filter).flatMap(({ keys }) => keys))];
+  }
+
+  /** Samples in another unit are dropped. */
+  #describe(signal) {
+    const before = this.signals.get(signal.signal);
+    if (before && before.unit !== signal.unit) this.of(signal.signal).clear();
+    this.signals.set(signal.signal, signal);
   }
 
   #take({ t, lost, signals }) {

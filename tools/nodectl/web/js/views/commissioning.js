@@ -21,9 +21,13 @@ class Commissioning {
     this.mapping = new Mapping(bus);
     this.panels = [[Pressure, new Pressure(bus, recorder)], [Encoder, new Encoder(bus, recorder)], [Lift, new Lift(bus, recorder)]];
     this.error = el("p", { class: "outcome", "data-kind": "bad", role: "status" });
-    this.content = el("div", {}, el("div", { class: "bar" }, nodeChoice(bus)), this.error, ...this.panels.map(([, panel]) => panel.element), this.mapping.element, lss(bus));
+    this.hint = el("p", { class: "hint", role: "status" });
+    this.content = el("div", {}, el("div", { class: "bar" }, nodeChoice(bus)), this.error, this.hint, ...this.panels.map(([, panel]) => panel.element), this.mapping.element, lss(bus));
     bus.on("chosen", () => this.isShown && this.show());
     bus.on("connected", () => this.isShown && this.show());
+    // A node has no personality before it is identified, and may have another one after a restart.
+    let personality = null;
+    bus.on("nodes", () => personality !== (personality = bus.node()?.personality) && this.isShown && this.show());
     bus.connection.on("mapping", ({ node }) => node === bus.chosen && this.isShown && this.mapping.refresh().catch((error) => text(this.error, error.message)));
   }
 
@@ -45,7 +49,7 @@ class Commissioning {
   async #load(panels) {
     try {
       for (const panel of panels) await panel.show();
-      await this.recorder.want("commissioning", this.shown.flatMap(({ keys }) => keys));
+      await this.recorder.want("commissioning", this.shown.flatMap(({ keys }) => keys), true);
       text(this.error, "");
     } catch (error) {
       text(this.error, error.message);
@@ -55,6 +59,14 @@ class Commissioning {
   #tick() {
     if (!this.isShown) return;
     for (const panel of this.shown) if (panel.keys.every(Boolean)) panel.draw();
+    text(this.hint, this.shown.length > 0 ? reason(this.bus.node()) : "");
     setTimeout(() => requestAnimationFrame(() => this.#tick()), FRAME_MS);
   }
+}
+
+/** Why a node has no values; empty if it has. */
+function reason(node) {
+  if (!node) return "";
+  if (!node.alive) return "No values: the node is not heard any more.";
+  return node.state === "stopped" ? "No values: the node is stopped. Start it in the overview." : "";
 }

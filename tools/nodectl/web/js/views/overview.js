@@ -27,6 +27,7 @@ class Overview {
     this.content = this.#layout();
     bus.on("nodes", () => this.#show());
     bus.on("hello", () => this.#show());
+    bus.on("connected", () => bus.connection.connected && this.result.clear());
     this.#show();
   }
 

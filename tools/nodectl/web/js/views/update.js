@@ -14,7 +14,7 @@ export function update(bus) {
 
 class Update {
   constructor(bus) {
-    Object.assign(this, { bus, known: new Map(), inspected: null, isShown: false });
+    Object.assign(this, { bus, known: new Map(), chosen: null, inspected: null, ticket: null, running: new Map(), isShown: false });
     this.result = outcome();
     this.checks = el("ul", { class: "checks", "aria-label": "Checks" });
     this.versions = el("p");
@@ -23,17 +23,19 @@ class Update {
     this.back = el("div");
     this.programs = new Programs(bus);
     this.content = this.#layout();
-    bus.connection.on("update", (event) => event.node === bus.chosen && this.#progress(event));
-    bus.on("chosen", () => this.#clear());
-    for (const event of ["chosen", "connected"]) bus.on(event, () => this.isShown && this.programs.show());
+    bus.connection.on("update", (event) => this.#progress(event));
+    bus.on("connected", () => this.running.clear());
+    // The checks are those of one node, and a new connection has no files.
+    for (const event of ["chosen", "connected"]) bus.on(event, () => (this.#clear(), this.#showProgress(), this.isShown && this.show()));
     // A node that has just come has no personality yet.
     let personality = null;
     bus.on("nodes", () => personality !== (personality = bus.node()?.personality) && this.isShown && this.programs.show());
   }
 
-  show() {
+  async show() {
     this.isShown = true;
-    return this.programs.show();
+    if (this.chosen && !this.inspected && !this.ticket && this.bus.connection.connected && !this.running.has(this.bus.chosen)) await this.#inspect(this.chosen);
+    await this.programs.show();
   }
 
   hide() {
@@ -41,7 +43,8 @@ class Update {
   }
 
   #layout() {
-    this.file = el("input", { type: "file", accept: ".img" });
+    // A browser reports the choice of the same file only if there is none before.
+    this.file = el("input", { type: "file", accept: ".img", on: { click: () => { this.file.value = ""; } } });
     this.file.addEventListener("change", () => this.file.files[0] && this.#read(this.file.files[0]));
     this.force = el("input", { type: "checkbox", on: { change: () => this.#offer() } });
     this.startButton = button("Update the node", () => this.#start(), { disabled: true });
@@ -52,17 +55,38 @@ class Update {
   }
 
   async #read(file) {
-    await this.#inspect({ name: file.name, data: await base64(file) });
+    this.#clear();
+    this.chosen = null;
+    try {
+      this.chosen = { name: file.name, data: await base64(file, this.bus.connection.largest, "a signed image, as firmware.img") };
+    } catch (error) {
+      return this.result.bad(error);
+    }
+    await this.#inspect(this.chosen);
   }
 
-  /** Lets the server check a file. Nothing is changed. */
+  /** Lets the server check a file for the chosen node. Nothing is changed. */
   async #inspect(file) {
     this.#clear();
-    const keys = { node: this.bus.chosen, name: file.name, data: file.data };
-    const answer = await this.result.of("checking", this.bus.request("update.inspect", keys), "the program fits: nothing is changed yet");
-    if (!answer) return;
-    if (!answer.allowed) this.result.bad("the program does not fit: nothing is changed");
-    this.inspected = answer;
+    const ticket = (this.ticket = {});
+    this.result.busy("checking");
+    try {
+      const answer = await this.#ask(file, this.bus.chosen);
+      if (this.ticket === ticket) this.#show(file, answer);
+    } catch (error) {
+      if (this.ticket === ticket) (this.#clear(), this.result.bad(error));
+    }
+  }
+
+  #ask({ name, data }, node) {
+    return this.bus.request("update.inspect", { node, name, data });
+  }
+
+  #show(file, answer) {
+    this.ticket = null;
+    this.inspected = { ...answer, source: file };
+    if (answer.allowed) this.result.good("the program fits: nothing is changed yet");
+    else this.result.bad("the program does not fit: nothing is changed");
     if (answer.image) this.known.set(answer.image.identification, { ...file, version: answer.image.version });
     text(this.versions, `In the node: ${program(answer.device)}. In the file: ${answer.image ? program(answer.image) : "no program"}.`);
     this.checks.replaceChildren(...answer.checks.map(({ name, ok, text: words }) => el("li", { data: { kind: ok ? "good" : "bad" } }, el("strong", {}, `${name}: ${ok ? "good" : "bad"}. `), words)));
@@ -75,23 +99,48 @@ class Update {
   }
 
   async #start() {
+    const { inspected, bus: { chosen: node } } = this;
+    if (!inspected) return;
     set(this.startButton, "disabled", true);
-    set(this.bar, "hidden", null);
-    const keys = { node: this.bus.chosen, file: this.inspected.file, force: this.force.checked };
-    const answer = await this.result.of("updating: do not take the power away", this.bus.request("update.start", keys), (done) => (done.result === "unchanged" ? "the node runs this program already" : `updated: ${of(done, "old")}, is now ${of(done, "new")}`));
-    set(this.bar, "hidden", true);
-    text(this.step, "");
-    if (answer) this.#offerBack(answer);
+    this.result.busy("updating: do not take the power away");
+    // The user may look at another node meanwhile.
+    const isShown = () => this.bus.chosen === node;
+    const named = (words) => (isShown() ? words : `node ${node}: ${words}`);
+    try {
+      const done = await this.#update(node, inspected);
+      this.result.good(named(done.result === "unchanged" ? "the node runs this program already" : `updated: ${of(done, "old")}, is now ${of(done, "new")}`));
+      if (isShown()) this.#offerBack(done);
+    } catch (error) {
+      this.result.bad(named(error.message));
+    }
     this.#offer();
     await this.programs.show();
   }
 
-  #progress({ step, text: words, done, all }) {
-    if (step === "done" || step === "failed") return;
-    set(this.bar, "hidden", null);
-    if (all) Object.assign(this.bar, { max: all, value: done });
+  /** The server keeps a file for one update. */
+  async #update(node, inspected) {
+    const { file } = inspected.isUsed ? await this.#ask(inspected.source, node) : inspected;
+    inspected.isUsed = true;
+    return this.bus.request("update.start", { node, file, force: this.force.checked });
+  }
+
+  #progress(event) {
+    const { node, step } = event;
+    const isOver = step === "done" || step === "failed";
+    if (isOver) this.running.delete(node);
+    else this.running.set(node, event);
+    if (node !== this.bus.chosen) return;
+    this.#showProgress();
+    if (isOver && this.isShown) this.show();
+  }
+
+  /** The progress of the chosen node. */
+  #showProgress() {
+    const event = this.running.get(this.bus.chosen);
+    set(this.bar, "hidden", !event);
+    if (event?.all) Object.assign(this.bar, { max: event.all, value: event.done });
     else this.bar.removeAttribute("value");
-    text(this.step, all ? `${words}: ${done} of ${all}` : words);
+    text(this.step, event?.all ? `${event.text}: ${event.done} of ${event.all}` : event?.text ?? "");
   }
 
   /** The former program can be put back when its file was chosen on this page. */
@@ -109,7 +158,7 @@ class Update {
   }
 
   #clear() {
-    this.inspected = null;
+    Object.assign(this, { inspected: null, ticket: null });
     this.checks.replaceChildren();
     this.back.replaceChildren();
     text(this.versions, "");

@@ -32,7 +32,6 @@ use super::turn::Turn;
 use crate::cli::store;
 use crate::cli::{Failure, Options, Output, Session};
 use crate::sdo::Channel;
-use crate::trace::Knowledge;
 use crate::{Catalogue, Network};
 
 type Work = Box<dyn FnOnce(&mut Context) -> Result<Json, Failure> + Send>;
@@ -77,8 +76,10 @@ pub(super) enum Learned {
     Catalogue(Arc<Catalogue>),
     /// The SDO channel for the node.
     Channel(Channel),
-    Survey(Survey, Box<Knowledge>),
+    Survey(Survey),
     Reading(Multiplexer, Vec<u8>),
+    /// A number that a unit depends on; `None` where the node refuses the object.
+    Number(Multiplexer, Option<Vec<u8>>),
 }
 
 /// The environment of a job.

@@ -28,17 +28,24 @@ pub(in crate::cli::serve) fn survey(node: NodeId) -> Job {
         let knowledge = knowledge.map_err(|error| session.named(error))?;
         let found = acquisition::survey(&mut session.client(node), &catalogue, &[]);
         let (tpdos, signals) = found.map_err(|error| session.named(error))?;
-        let survey = Survey { tpdos, signals, catalogue: Some(catalogue) };
+        let survey = Survey { tpdos, signals, knowledge };
         let signals = survey.describe(node);
-        context.learned(node, Learned::Survey(survey, Box::new(knowledge)));
+        context.learned(node, Learned::Survey(survey));
         Ok(json!({ "signals": signals }))
     })
 }
 
-/// Reads the followed objects that no TPDO carries.
-pub(in crate::cli::serve) fn poll(node: NodeId, objects: Vec<Multiplexer>) -> Job {
+/// Reads the followed objects that no TPDO brings, and before them the objects that their units depend on.
+pub(in crate::cli::serve) fn poll(node: NodeId, units: Vec<Multiplexer>, objects: Vec<Multiplexer>) -> Job {
     Job::of_node(node, move |context| {
         context.session.begin();
+        for at in units {
+            match context.session.client(node).upload(at) {
+                Ok(bytes) => context.learned(node, Learned::Number(at, Some(bytes))),
+                Err(error) if error.abort().is_some() => context.learned(node, Learned::Number(at, None)),
+                Err(error) => return Err(context.session.named(error)),
+            }
+        }
         for at in objects {
             match context.session.client(node).upload(at) {
                 Ok(bytes) => context.learned(node, Learned::Reading(at, bytes)),

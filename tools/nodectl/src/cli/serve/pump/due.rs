@@ -1,5 +1,6 @@
 //! Periodic work of the pump: events for the pages, and jobs that no page has requested.
 
+use canopen::nmt::State;
 use canopen::{Duration, Instant, NodeId};
 use serde_json::json;
 
@@ -9,6 +10,7 @@ use crate::cli::serve::jobs;
 use crate::cli::serve::nodes::Node;
 use crate::cli::serve::schedule::{Haste, Lane};
 use crate::cli::serve::status;
+use crate::object::at;
 
 impl Pump {
     pub(super) fn tick(&mut self) {
@@ -83,7 +85,7 @@ impl Pump {
         }
         let now = clock::now();
         let is_to_be_asked = |node: NodeId, entry: &Node| {
-            let is_deaf = entry.state() == Some(canopen::nmt::State::Stopped) || entry.updating;
+            let is_deaf = entry.state() == Some(State::Stopped) || entry.updating;
             let is_new = entry.asked.is_none_or(|asked| entry.is_unknown() && t - asked > ASK_AGAIN);
             let is_alone = self.others.since_request(node, now).is_none_or(|time| time > ALONE);
             entry.is_alive() && is_new && !is_deaf && is_alone && entry.since_boot(t) > AFTER_BOOT
@@ -106,19 +108,19 @@ impl Pump {
     pub(super) fn poll(&mut self) {
         for node in self.live.wanted_nodes() {
             let is_free = !self.schedule.has(Lane::Node(node)) && self.is_calm(node, self.now());
-            if !is_free
-                || self.bus.is_err()
-                || !self.nodes.get(node).is_some_and(super::super::nodes::Node::is_alive)
-            {
+            // A stopped node has no SDO server.
+            let answers = |entry: &Node| entry.is_alive() && entry.state() != Some(State::Stopped);
+            if !is_free || self.bus.is_err() || !self.nodes.get(node).is_some_and(answers) {
                 continue;
             }
             if self.live.survey(node).is_none() {
                 self.survey(node);
                 continue;
             }
-            let objects = self.live.polled(node);
+            let unasked = self.live.unasked(node).into_iter().map(|(index, sub)| at(index, sub)).collect();
+            let objects = self.live.polled(node, self.now());
             if !objects.is_empty() {
-                let waiting = Waiting::of_server(node, jobs::poll(node, objects));
+                let waiting = Waiting::of_server(node, jobs::poll(node, unasked, objects));
                 self.enqueue(Lane::Node(node), Haste::Background, waiting);
             }
         }

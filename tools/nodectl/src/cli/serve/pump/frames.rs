@@ -37,7 +37,7 @@ impl Pump {
             self.pages.tell(&self.setup.hub, &json!(news));
         }
         self.live.on_frame(frame, t);
-        self.look_at_writes(frame, t);
+        self.hear_transfer(frame, t);
         if let Some((node, ended)) = self.others.on_frame(frame, clock::now()) {
             self.overhear(node, &ended);
         }
@@ -68,16 +68,27 @@ impl Pump {
         }
     }
 
-    /// Notes a node whose PDO parameters are written, by this program or by another master.
-    pub(super) fn look_at_writes(&mut self, frame: &Frame, t: f64) {
-        let node = frame.id().checked_sub(0x600).and_then(|id| NodeId::new(u8::try_from(id).ok()?));
-        let (Some(node), &[command, low, high, ..]) = (node, frame.data()) else { return };
-        // Initiate download, expedited or not (CiA 301, 7.2.4.3.3).
-        if command >> 5 == 1 && (0x1800..0x1C00).contains(&u16::from_le_bytes([low, high])) {
-            match self.remapped.iter_mut().find(|(other, _)| *other == node) {
-                Some((_, since)) => *since = t,
-                None => self.remapped.push((node, t)),
+    /// Takes an SDO frame of any client, this program included.
+    fn hear_transfer(&mut self, frame: &Frame, t: f64) {
+        let Some((node, is_additional, frame)) = self.others.sdo(frame) else { return };
+        let transfers = &mut self.transfers[usize::from(is_additional)];
+        for ended in transfers.on_frame(node, &frame, clock::now()) {
+            let Some(bytes) = ended.value() else { continue };
+            if ended.is_write && (0x1800..0x1C00).contains(&ended.at.index) {
+                self.note_remapped(node, t);
             }
+            self.tracer.hear(node, &ended);
+            if self.live.hear(node, ended.at, bytes) {
+                self.tell_mapping(node);
+            }
+        }
+    }
+
+    /// Notes a node whose PDO parameters are written, by this program or by another master.
+    pub(super) fn note_remapped(&mut self, node: NodeId, t: f64) {
+        match self.remapped.iter_mut().find(|(other, _)| *other == node) {
+            Some((_, since)) => *since = t,
+            None => self.remapped.push((node, t)),
         }
     }
 
@@ -89,7 +100,7 @@ impl Pump {
         let (here, t) = (clock::now(), self.now());
         self.count.add(frame);
         self.peak.add(status::bits(frame), t);
-        self.look_at_writes(frame, t);
+        self.hear_transfer(frame, t);
         if self.pages.have_trace() {
             self.tracer.on_frame(frame, here, t, true);
         }

@@ -30,6 +30,7 @@ use crate::cli::Options;
 use crate::cli::load::Peak;
 use crate::other_clients::OtherClients;
 use crate::page::{Hub, PageId};
+use crate::trace::Transfers;
 
 /// The number of frames that are taken before the next look for orders.
 const AT_ONCE: usize = 512;
@@ -113,6 +114,8 @@ pub(super) struct Pump {
     tracer: Tracer,
     pages: Pages,
     others: OtherClients,
+    /// The transfers of all clients: on the default channels, and on the additional ones.
+    transfers: [Transfers; 2],
     schedule: Schedule<Waiting>,
     running: Vec<Running>,
     count: Count,
@@ -154,6 +157,7 @@ impl Pump {
             tracer: Tracer::default(),
             pages: Pages::default(),
             others: OtherClients::default(),
+            transfers: Default::default(),
             schedule: Schedule::default(),
             running: Vec::new(),
             count: Count::default(),

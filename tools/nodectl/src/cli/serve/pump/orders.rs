@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration as StdDuration;
 
-use crate::page::{FromPage, PageId};
+use crate::page::{FromPage, LARGEST, PageId};
 use canopen::NodeId;
 use serde_json::{Value as Json, json};
 
@@ -42,7 +42,7 @@ impl Pump {
             Order::Page(FromPage::Came { page, writes }) => self.welcome(page, writes),
             Order::Page(FromPage::Left { page }) => {
                 self.pages.leave(page);
-                self.live.want(self.pages.follows());
+                self.want();
                 self.drop_jobs(page);
             }
             Order::Page(FromPage::Said { page, text }) => self.hear(page, &text),
@@ -64,7 +64,7 @@ impl Pump {
         let hello = json!({
             "event": "hello", "protocol": PROTOCOL, "version": env!("CARGO_PKG_VERSION"),
             "bus": self.setup.options.bus.to_string(), "writes": writes,
-            "simulator": self.setup.control.is_some(), "t": self.now(),
+            "simulator": self.setup.control.is_some(), "t": self.now(), "largest": LARGEST,
         });
         self.setup.hub.send(page, hello.to_string());
         self.setup.hub.send(page, self.nodes.all().to_string());
@@ -100,8 +100,8 @@ impl Pump {
     /// Answers a request that needs no bus at once. Any other request becomes a job.
     pub(super) fn serve(&mut self, asker: Asker, what: What) {
         match what {
-            What::Follow { signals } => {
-                let result = self.follow(asker.page, &signals);
+            What::Follow { signals, read } => {
+                let result = self.follow(asker.page, &signals, &read);
                 self.answer(&asker, result);
             }
             What::Trace { on, kinds, nodes } => {
@@ -176,24 +176,36 @@ impl Pump {
         }
     }
 
-    pub(super) fn follow(&mut self, page: PageId, signals: &[String]) -> Result<Json, Refusal> {
+    pub(super) fn follow(
+        &mut self,
+        page: PageId,
+        signals: &[String],
+        read: &[String],
+    ) -> Result<Json, Refusal> {
         const MOST: usize = 256;
         if signals.len() > MOST {
             return Err(Refusal::new(format!("{} signals; at most {MOST}", signals.len())));
         }
-        let keys: Result<BTreeSet<Key>, String> = signals.iter().map(|signal| signal.parse()).collect();
-        let keys = keys.map_err(Refusal::new)?;
+        let parse = |signals: &[String]| -> Result<BTreeSet<Key>, Refusal> {
+            signals.iter().map(|signal| signal.parse().map_err(Refusal::new)).collect()
+        };
+        let (keys, mut reads) = (parse(signals)?, parse(read)?);
+        reads.retain(|key| keys.contains(key));
         let known: Vec<Json> = keys.iter().filter_map(|key| self.live.describe(*key)).collect();
         if let Some(page) = self.pages.get(page) {
-            page.follows = keys;
+            (page.follows, page.reads) = (keys, reads);
         }
-        self.live.want(self.pages.follows());
+        self.want();
         for node in self.live.wanted_nodes() {
             if self.live.survey(node).is_none() {
                 self.survey(node);
             }
         }
         Ok(json!({ "signals": known }))
+    }
+
+    fn want(&mut self) {
+        self.live.want(self.pages.follows(), self.pages.reads());
     }
 
     /// Surveys a node, unless a job of this node waits or runs.

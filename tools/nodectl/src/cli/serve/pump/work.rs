@@ -129,8 +129,14 @@ impl Pump {
                 let kind = (identity.vendor, identity.product);
                 let catalogue = Arc::clone(self.catalogues.entry(kind).or_insert(catalogue));
                 self.tracer.know(node, &catalogue);
+                let t = self.now();
                 let entry = self.nodes.change(node);
+                let is_other = entry.catalogue.as_ref().is_some_and(|known| !Arc::ptr_eq(known, &catalogue));
                 (entry.identity, entry.catalogue) = (Some(identity), Some(catalogue));
+                if is_other {
+                    // The node has another data sheet than its survey.
+                    self.note_remapped(node, t);
+                }
             }
             Learned::Channel(channel) => {
                 let additional = Some(channel).filter(|channel| *channel != Channel::default_of(node));
@@ -141,16 +147,26 @@ impl Pump {
                 self.tracer.know(node, &catalogue);
                 self.nodes.change(node).catalogue = Some(catalogue);
             }
-            Learned::Survey(survey, knowledge) => {
-                self.tracer.learn(node, *knowledge);
+            Learned::Survey(survey) => {
+                self.tracer.learn(node, survey.knowledge.clone());
                 self.live.learn(node, survey);
-                self.pages.tell(&self.setup.hub, &json!({ "event": "mapping", "node": node.get() }));
+                self.tell_mapping(node);
+            }
+            Learned::Number(object, bytes) => {
+                if self.live.answer(node, object, bytes.as_deref()) {
+                    self.tell_mapping(node);
+                }
             }
             Learned::Reading(object, bytes) => {
                 let t = self.now();
                 self.live.on_reading(Key::new(node, object), t, &bytes);
             }
         }
+    }
+
+    /// Tells the pages that the signals of a node are others, or have other units.
+    pub(super) fn tell_mapping(&self, node: NodeId) {
+        self.pages.tell(&self.setup.hub, &json!({ "event": "mapping", "node": node.get() }));
     }
 
     pub(super) fn on_stimuli(&mut self, mut news: Json) {
