@@ -213,7 +213,10 @@ fn at_once(node: NodeId, allowed: Effect) -> String {
         Effect::Stores => "; its saved parameters may be the defaults or those of a check",
         _ => "",
     };
-    format!("ended at once: node {} may have values and the NMT state of a check until its next reset{saved}", node.get())
+    format!(
+        "ended at once: node {} may have values and the NMT state of a check until its next reset{saved}",
+        node.get()
+    )
 }
 
 /// A progress bar, which is only visible on a terminal.

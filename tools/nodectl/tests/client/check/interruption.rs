@@ -66,7 +66,8 @@ fn run_until(wire: &Wire<Faulty>, stop: Arc<AtomicBool>, only: &[&str], sheet: O
     let mut checks = check::all(None);
     checks.retain(|check| only.iter().any(|text| check.is_meant(text)));
     let mut network = wire.network();
-    let mut subject = Subject::new(&mut network, setup).with_interruption(move || stop.load(Ordering::Relaxed));
+    let mut subject =
+        Subject::new(&mut network, setup).with_interruption(move || stop.load(Ordering::Relaxed));
     let options = check::Options { checks, allowed: Effect::Stores };
     check::run(&mut subject, &options, |_| ()).unwrap_or_else(|stop| panic!("{stop:?}"))
 }
