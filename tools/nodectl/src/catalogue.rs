@@ -135,6 +135,24 @@ impl Catalogue {
         Some(Value::Integer(u32::from_le_bytes(letters).into()))
     }
 
+    /// The words that a person may type for an object; `None` where there are none.
+    #[must_use]
+    pub fn words(&self, at: Multiplexer) -> Option<&'static str> {
+        let entry = self.entry(at)?;
+        if entry.data_type == DataType(0x07) && entry.name.to_lowercase().contains("physical unit") {
+            return Some("units: bar, mbar, Pa, kPa, MPa, psi, at, atm, mmHg, mmH2O, K, degC, degF");
+        }
+        match (at.index, at.sub) {
+            (0x1010, 1..) => Some("word: save"),
+            (0x1011, 1..) => Some("word: load"),
+            (0x6125 | 0x6925, 1..) => Some("word: zero"),
+            (0x6139 | 0x6939, 1..) => Some("word: tare"),
+            (0x2203, 0) if self.is_of_this_project() => Some("word: cali"),
+            (0x2108, 0) if self.is_of_this_project() => Some("word: fact"),
+            _ => None,
+        }
+    }
+
     /// Whether an object accepts a value, by the limits of the data sheet.
     #[must_use]
     pub fn allows(&self, at: Multiplexer, node: NodeId, value: &Value) -> bool {

@@ -79,7 +79,11 @@ impl Write {
         let word = catalogue.word(at, text);
         match word.map_or_else(|| self.parse(text, data_type, quantity), Ok) {
             Ok(value) => Ok(value.encode(data_type)),
-            Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
+            Err(error) => {
+                let words = catalogue.words(at).filter(|_| !self.raw);
+                let words = words.map_or_else(String::new, |words| format!("; {words}"));
+                Err(Failure::Usage(format!("{}: {error}{words}", Place(at))))
+            }
         }
     }
 
