@@ -78,6 +78,8 @@ def test_an_interrupted_check_leaves_what_the_node_had(personality: str, only: s
 
 def test_a_second_signal_ends_a_check_at_once():
     simulator = Simulator("--node", "5:pressure", speed="real")
+    # The node has booted before the check makes it boot.
+    assert nodectl(simulator, "read", "1000", node=5).returncode == 0
     master = Master(simulator)
     boot_up = master.listen(0x705)
     command = [os.environ["NODECTL_COMMAND"], "--bus", f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0", "--node", "5"]

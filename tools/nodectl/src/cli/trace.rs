@@ -160,9 +160,9 @@ impl Trace {
         loop {
             // Beside another client, each transfer waits for its turn.
             if session.has_other_client(node) {
-                session.begin_all()
+                session.begin_all();
             } else {
-                session.begin()
+                session.begin();
             }
             let catalogue = session.catalogue(node);
             let asked = catalogue.and_then(|catalogue| {
