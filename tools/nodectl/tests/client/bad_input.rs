@@ -55,10 +55,11 @@ const REFUSED: [&[&str]; 33] = [
 ];
 
 /// Command lines that the node, the data sheet or the command itself refuses.
-const FAILED: [&[&str]; 46] = [
+const FAILED: [&[&str]; 47] = [
     &["read", "no such thing"],
     &["replay", "x", "--speed", "-1"],
     &["write", "6131:1", "furlong"],
+    &["write", "1017:5", "1"],
     &["write", "1010:1", "Save"],
     &["write", "2203", "calli"],
     &["rules", "--file", "none", "--device", "1=presure"],
