@@ -154,3 +154,57 @@ def test_the_cams_are_not_cut_off_on_a_phone(page: Page, node: int, width: int):
     assert page.script(CUT) == []
     tall = page.find(".cams tbody tr").rect["height"]
     assert tall < 170, f"a cam takes {tall} pixels"
+
+
+def test_a_node_with_another_personality_has_its_panels_and_signals(page: Page, simulator: Simulator):
+    command(page, "start", "operational")
+    choose(page, "live", ENCODER)
+    choose(page, "commissioning", ENCODER)
+    page.until(lambda: len(shown(page)) == 1, "show the panel of an encoder")
+    try:
+        write(simulator, ENCODER, "2000", "2")
+        assert nodectl(simulator, "nmt", "reset", "--node", str(ENCODER)).returncode == 0
+        page.until(lambda: all(map(re.fullmatch, [r"[\d.]+ bar", r"-?\d+ units"], shown(page))) and len(shown(page)) == 2, "show both panels")
+        page.view("live")
+        page.until(lambda: f"{ENCODER}:6930:1" in values(page), "list the pressure")
+        names = page.script("return [...document.querySelectorAll('#view-live .signals tbody th')].map(({ innerText }) => innerText)")
+        assert all(names) and "Pressure process value" in str(names)
+    finally:
+        write(simulator, ENCODER, "2000", "1")
+        assert nodectl(simulator, "nmt", "reset", "--node", str(ENCODER)).returncode == 0
+    choose(page, "commissioning", ENCODER)
+    page.until(lambda: len(shown(page)) == 1, "show the panel of an encoder again")
+
+
+MAPPING = "#view-commissioning [aria-labelledby=mapping-title]"
+
+
+@pytest.mark.parametrize(("node", "label", "wrong", "words"), [
+    (PRESSURE, "Transmission type", "300", "a whole number from 0 to 255"),
+    (ENCODER, "Transmission type", "-1", "a whole number from 0 to 255"),
+    (COMBINED, "Transmission type", "1.5", "a whole number from 0 to 255"),
+    (ENCODER, "Event timer, ms", "70000", "a whole number from 0 to 65535"),
+    (PRESSURE, "Inhibit time, 100 us", "", "a whole number from 0 to 65535"),
+])
+def test_a_wrong_number_of_a_pdo_is_named(page: Page, node: int, label: str, wrong: str, words: str):
+    choose(page, "commissioning", node)
+    page.says(MAPPING, f"{0x180 + node:X}h")
+    field = page.field(label)
+    field.clear()
+    field.send_keys(wrong)
+    page.press("Map", "[aria-labelledby=mapping-title]")
+    assert page.says(f"{MAPPING} .outcome", words).startswith(label)
+
+
+def test_a_pdo_without_an_object_is_not_mapped(page: Page):
+    choose(page, "commissioning", PRESSURE)
+    page.until(lambda: "6130h:1" in page.text(MAPPING), "show the mapping")
+    page.choose("PDO", "2")
+    page.press("Map", "[aria-labelledby=mapping-title]")
+    page.says(f"{MAPPING} .outcome", "Choose an object.")
+
+
+def test_a_fixed_mapping_is_not_offered_for_a_change(page: Page):
+    choose(page, "commissioning", LIFT)
+    page.says(MAPPING, "The mapping of this PDO is fixed")
+    assert page.script(f"return [...document.querySelectorAll('{MAPPING} button')].every(({{ disabled }}) => disabled)")

@@ -90,7 +90,11 @@ def test_one_file_updates_two_nodes(two, tmp_path: Path):
         page.choose("Node", str(node))
         page.until(lambda: page.script(STARTS), f"check the same file for node {node}")
         page.press("Update the node")
-        page.says("#view-update .outcome", f"is now version 0.1.0, identification {identification(b):08X}h")
+        page.says("#view-update [role=status]", " of ")
+        page.choose("Node", str(3 - node))
+        assert page.text("#view-update [role=status]") == "", "the progress is that of another node"
+        page.choose("Node", str(node))
+        page.says("#view-update .outcome", "updated: ")
         page.until(lambda: page.read(node, 0x1F56, 1) == identification(b), f"read the identification in node {node}")
 
 
@@ -109,11 +113,15 @@ def test_a_chosen_file_is_checked_again_after_a_lost_connection(two):
     page, server, simulator = two
     page.view("update")
     checked(page, Path(os.environ["NODE_IMAGES"]) / "firmware.img")
+    page.view("overview")
+    page.script("[...document.querySelectorAll('#view-overview button')].find(({ innerText }) => innerText === 'Scan').click()")
     server.stop()
     page.says("#connection", "no server: trying again")
     again = Server(simulator, server.url.split("/")[2].split("?")[0])
     try:
         page.says("#connection", "connected")
+        assert page.text("#view-overview .outcome") == "", "the lost connection is told beside the new one"
+        page.view("update")
         page.says("#view-update .outcome", "the program fits")
         page.press("Update the node")
         page.says("#view-update .outcome", "the node runs this program already")

@@ -4,6 +4,7 @@ use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use eds::{DEVICES, DataType, Device, DeviceInfo, Eds, Entry, LookupError};
 
+use crate::object::Place;
 use crate::unit;
 use crate::value::Value;
 
@@ -135,22 +136,32 @@ impl Catalogue {
         Some(Value::Integer(u32::from_le_bytes(letters).into()))
     }
 
-    /// The words that a person may type for an object; `None` where there are none.
+    /// The words that an object accepts besides numbers, for the end of an error: `, or the word save`. Empty for most.
     #[must_use]
-    pub fn words(&self, at: Multiplexer) -> Option<&'static str> {
-        let entry = self.entry(at)?;
-        if entry.data_type == DataType(0x07) && entry.name.to_lowercase().contains("physical unit") {
-            return Some("units: bar, mbar, Pa, kPa, MPa, psi, at, atm, mmHg, mmH2O, K, degC, degF");
+    pub fn words(&self, at: Multiplexer) -> String {
+        const SIGNED: [(u16, &str); 4] =
+            [(0x1010, "save"), (0x1011, "load"), (0x6125, "zero"), (0x6139, "tare")];
+        let of_unit = self.entry(at).is_some_and(|entry| entry.name.to_lowercase().contains("physical unit"));
+        if of_unit {
+            return ", or a unit, such as kPa, mbar or psi".to_owned();
         }
-        match (at.index, at.sub) {
-            (0x1010, 1..) => Some("word: save"),
-            (0x1011, 1..) => Some("word: load"),
-            (0x6125 | 0x6925, 1..) => Some("word: zero"),
-            (0x6139 | 0x6939, 1..) => Some("word: tare"),
-            (0x2203, 0) if self.is_of_this_project() => Some("word: cali"),
-            (0x2108, 0) if self.is_of_this_project() => Some("word: fact"),
-            _ => None,
-        }
+        // In a module of two devices, the second one is 800h higher.
+        let word = SIGNED.iter().find(|(index, _)| at.index == *index || at.index == index | 0x0800);
+        word.filter(|_| at.sub > 0).map(|(_, word)| format!(", or the word {word}")).unwrap_or_default()
+    }
+
+    /// Why there is no type for an object: the data sheet has the index without this sub-index, or not at all.
+    #[must_use]
+    pub fn missing(&self, at: Multiplexer) -> String {
+        let object = self.sheet.objects.get(&at.index).or_else(|| self.common.objects.get(&at.index));
+        let Some(object) = object else {
+            return format!("no data sheet states the type of {}", Place(at));
+        };
+        let has = match object.entries.keys().last() {
+            Some(highest) if object.object_type.has_subs() => format!("its highest sub-index is {highest}"),
+            _ => format!("the object has one value, {:04X}h", at.index),
+        };
+        format!("the data sheet has no {}: {has}", Place(at))
     }
 
     /// Whether an object accepts a value, by the limits of the data sheet.

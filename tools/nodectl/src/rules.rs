@@ -1,6 +1,6 @@
 //! Data sheets for the monitor, which judges the traffic of a bus.
 
-use std::io::ErrorKind;
+use std::io;
 use std::str::FromStr;
 
 use canopen::NodeId;
@@ -39,19 +39,15 @@ impl Device {
         if let Some(own) = own {
             return Ok(Sheet::of_node(own.rows));
         }
-        let bytes = wire::input::read(self.name.as_ref(), 4 << 20).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => format!("no file, and no personality: {}", personalities()),
-            _ => error.to_string(),
-        })?;
+        let no_personality = |error: io::Error| {
+            let names: Vec<&str> =
+                DEVICES.iter().map(|device| device.file_name.trim_end_matches(".eds")).collect();
+            format!("no personality ({}) and no data sheet: {error}", names.join(", "))
+        };
+        let bytes = wire::input::read(self.name.as_ref(), 4 << 20).map_err(no_personality)?;
         let sheet = Eds::from_bytes(&bytes).map_err(|error| error.to_string())?;
         Ok(of_data_sheet(&sheet, self.node))
     }
-}
-
-/// The personalities of this project, by name.
-fn personalities() -> String {
-    let names: Vec<&str> = DEVICES.iter().map(|device| device.file_name.trim_end_matches(".eds")).collect();
-    names.join(", ")
 }
 
 /// The sheet of a data sheet. A data sheet does not tell which values are saved, or which values a device changes by

@@ -10,7 +10,7 @@ use eds::DataType;
 use super::read::{Reading, parse_type};
 use super::{Failure, Session};
 use crate::Catalogue;
-use crate::object::{self, Place};
+use crate::object::Place;
 use crate::quantity::Quantity;
 use crate::value::{Value, ValueError};
 
@@ -73,31 +73,20 @@ impl Write {
             return fs::read(path).map_err(|error| Failure::file(path, error));
         }
         let text = self.value.as_deref().unwrap_or_default();
-        let data_type = data_type
-            .ok_or_else(|| Failure::Usage(format!("{}: give it with --type", unknown(catalogue, at))))?;
+        let data_type = data_type.ok_or_else(|| {
+            let missing = catalogue.missing(at);
+            let is_known = missing.starts_with("the data sheet");
+            let hint = if is_known { "" } else { ": give it with --type" };
+            Failure::Usage(format!("{missing}{hint}"))
+        })?;
         let word = catalogue.word(at, text);
         match word.map_or_else(|| self.parse(text, data_type, quantity), Ok) {
             Ok(value) => Ok(value.encode(data_type)),
-            Err(error) => {
-                let words = catalogue.words(at).filter(|_| !self.raw);
-                let words = words.map_or_else(String::new, |words| format!("; {words}"));
-                Err(Failure::Usage(format!("{}: {error}{words}", Place(at))))
-            }
+            Err(error) => Err(Failure::Usage(format!("{}: {error}{}", Place(at), catalogue.words(at)))),
         }
     }
 
     fn parse(&self, text: &str, data_type: DataType, quantity: &Quantity) -> Result<Value, ValueError> {
         if self.raw { Value::parse(text, data_type) } else { quantity.parse(text, data_type) }
-    }
-}
-
-/// Why the type of an object is not known.
-fn unknown(catalogue: &Catalogue, at: Multiplexer) -> String {
-    match catalogue.entries().find(|entry| entry.index == at.index) {
-        Some(entry) => {
-            let known = Place(object::at(entry.index, entry.sub));
-            format!("the data sheet has {known}, but not {} and its type", Place(at))
-        }
-        None => format!("no data sheet states the type of {}", Place(at)),
     }
 }

@@ -143,6 +143,34 @@ fn every_bad_input_has_an_error_text() {
     assert_eq!(std::fs::read_to_string(PAGE).expect("the page"), page);
 }
 
+/// A message names the words, objects or files that are right.
+#[test]
+fn a_message_names_what_is_right() {
+    let short = format!("{}/short.img", env!("CARGO_TARGET_TMPDIR"));
+    std::fs::write(&short, "12 bytes ...").expect("a file");
+    for (line, words) in [
+        (&["write", "6131:1", "furlong"][..], "or a unit, such as kPa, mbar or psi"),
+        (&["write", "6131:1", "save"], "or a unit, such as"),
+        (&["write", "1010:1", "Save"], "or the word save"),
+        (&["write", "1011:1", "save it"], "or the word load"),
+        (&["write", "6125:1", "null"], "or the word zero"),
+        (&["write", "6139:1", "null"], "or the word tare"),
+        (&["write", "1006", "soon"], "is not a whole number from 0 to 4294967295"),
+        (&["write", "6131:9", "1"], "the data sheet has no 6131h:9: its highest sub-index is 2"),
+        (&["write", "1017:1", "1"], "the data sheet has no 1017h:1: the object has one value, 1017h"),
+        (&["update", &short], "it has 12 bytes: too short for an image (firmware.img)"),
+        (
+            &["rules", "--file", &short, "--device", "1=presure"],
+            "no personality (pressure, encoder, combined, lift)",
+        ),
+    ] {
+        let (code, text) = failed(&Wire::new(Pressure::new(1)), line);
+        assert!(code != 0 && text.contains(words), "{line:?}: {text}");
+    }
+    let (_, text) = failed(&Wire::new(Pressure::new(1)), &["write", "1006", "soon"]);
+    assert!(!text.contains("the word"), "{text}");
+}
+
 #[test]
 fn an_error_of_the_command_line_names_the_arguments_in_json() {
     for (line, words) in [

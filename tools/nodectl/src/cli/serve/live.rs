@@ -343,7 +343,11 @@ mod tests {
             signal
         };
         let signals = mapping.iter().map(signal).collect();
-        Survey { tpdos: vec![Tpdo { number: 1, id: 0x185, mapping }], signals, knowledge: Knowledge::default() }
+        Survey {
+            tpdos: vec![Tpdo { number: 1, id: 0x185, mapping }],
+            signals,
+            knowledge: Knowledge::default(),
+        }
     }
 
     fn node() -> NodeId {
@@ -412,7 +416,8 @@ mod tests {
             let (mut live, key) = (Live::default(), Key::new(node(), at(of, 1)));
             live.learn(node(), Survey { knowledge: Knowledge::new(catalogue), ..Survey::default() });
             live.want(BTreeSet::from([key]), BTreeSet::new());
-            let unit = |live: &Live| live.describe(key).expect("a survey")["unit"].as_str().map(str::to_owned);
+            let unit =
+                |live: &Live| live.describe(key).expect("a survey")["unit"].as_str().map(str::to_owned);
             let sample = |live: &mut Live| {
                 live.on_reading(key, 1.0, &250_u32.to_le_bytes());
                 let json: Json = serde_json::from_str(&live.take().0[&key].json).expect("JSON");

@@ -41,6 +41,7 @@ export class Mapping {
     this.type = el("input", { type: "number", min: 0, max: 255 });
     this.event = el("input", { type: "number", min: 0, max: 65535 });
     this.inhibit = el("input", { type: "number", min: 0, max: 65535 });
+    this.buttons = [button("Map", () => this.#map()), button("Switch off", () => this.#send({ objects: [] }))];
     this.numbers = [this.type, this.event, this.inhibit];
     const head = HEAD.map((name) => el("th", { scope: "col" }, name));
     const table = el("table", { class: "pdos cards" }, el("caption", { class: "unseen" }, "PDOs"), el("thead", {}, el("tr", {}, head)), this.list);
@@ -48,7 +49,7 @@ export class Mapping {
       el("div", { class: "wide" }, table),
       el("div", { class: "bar" }, field("PDO", this.choice), field("Transmission type", this.type), field("Event timer, ms", this.event), field("Inhibit time, 100 us", this.inhibit)),
       el("div", { class: "slots" }, this.slots.map((slot, at) => field(`Object ${at + 1}`, slot))), this.bits,
-      el("div", { class: "bar" }, button("Map", () => this.#map()), button("Switch off", () => this.#send({ objects: [] }))), this.steps, this.result.line);
+      el("div", { class: "bar" }, this.buttons), this.steps, this.result.line);
   }
 
   #fillList() {
@@ -75,8 +76,17 @@ export class Mapping {
     this.type.value = pdo.transmission;
     this.event.value = pdo.event ?? 0;
     this.inhibit.value = pdo.inhibit ?? 0;
+    const isFixed = this.#isFixed(pdo);
+    for (const control of [...this.slots, ...this.numbers, ...this.buttons]) control.disabled = isFixed;
     this.#mark(0);
     this.#countBits();
+    if (isFixed) text(this.bits, "The mapping of this PDO is fixed: the data sheet has no writable mapping parameter.");
+  }
+
+  #isFixed({ direction, number }) {
+    const index = (direction === "tpdo" ? 0x1a00 : 0x1600) + number - 1;
+    const entry = this.entries.find((entry) => entry.index === index && entry.sub === 0);
+    return entry != null && !entry.access.includes("w");
   }
 
   #objects() {

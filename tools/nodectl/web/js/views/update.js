@@ -14,7 +14,7 @@ export function update(bus) {
 
 class Update {
   constructor(bus) {
-    Object.assign(this, { bus, known: new Map(), chosen: null, inspected: null, ticket: null, running: new Map(), isShown: false });
+    Object.assign(this, { bus, known: new Map(), chosen: null, inspected: null, ticket: null, running: new Map(), own: new Set(), isShown: false });
     this.result = outcome();
     this.checks = el("ul", { class: "checks", "aria-label": "Checks" });
     this.versions = el("p");
@@ -106,6 +106,7 @@ class Update {
     // The user may look at another node meanwhile.
     const isShown = () => this.bus.chosen === node;
     const named = (words) => (isShown() ? words : `node ${node}: ${words}`);
+    this.own.add(node);
     try {
       const done = await this.#update(node, inspected);
       this.result.good(named(done.result === "unchanged" ? "the node runs this program already" : `updated: ${of(done, "old")}, is now ${of(done, "new")}`));
@@ -113,6 +114,8 @@ class Update {
     } catch (error) {
       this.result.bad(named(error.message));
     }
+    this.own.delete(node);
+    if (isShown()) this.inspected ??= inspected;
     this.#offer();
     await this.programs.show();
   }
@@ -131,7 +134,8 @@ class Update {
     else this.running.set(node, event);
     if (node !== this.bus.chosen) return;
     this.#showProgress();
-    if (isOver && this.isShown) this.show();
+    // The result of an update of this page stays on display.
+    if (isOver && this.isShown && !this.own.has(node)) this.show();
   }
 
   /** The progress of the chosen node. */

@@ -165,11 +165,9 @@ fn encode(
     quantity: &Quantity,
 ) -> Result<Vec<u8>, Failure> {
     let refuse = |words: String| Failure::Usage(format!("{}: {words}", Place(at)));
-    let data_type = catalogue
-        .data_type(at)
-        .ok_or_else(|| refuse("no data sheet states the type of this object".to_owned()))?;
+    let data_type = catalogue.data_type(at).ok_or_else(|| Failure::Usage(catalogue.missing(at)))?;
     let value = catalogue.word(at, text).map_or_else(|| quantity.parse(text, data_type), Ok);
-    let value = value.map_err(|error| refuse(error.to_string()))?;
+    let value = value.map_err(|error| refuse(format!("{error}{}", catalogue.words(at))))?;
     if !catalogue.allows(at, node, &value) {
         let range = catalogue.range(at, node).unwrap_or_default();
         return Err(refuse(format!("{value} is out of range; it takes {range}")));

@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn a_file_that_is_no_image_is_reported_before_any_request() {
         assert!(decode("%%%").is_err());
-        for (bytes, words) in [(&b"\x7fELF"[..], "ELF"), (b"nothing", "too few"), (b"", "too few")] {
+        for (bytes, words) in [(&b"\x7fELF"[..], "ELF"), (b"nothing", "too short"), (b"", "too short")] {
             assert!(parse(bytes.to_vec()).unwrap_err().contains(words));
         }
     }
