@@ -11,7 +11,7 @@ import subprocess
 import time
 
 import pytest
-from simulator import PATIENCE, Master, Relay, Simulator, nodectl
+from simulator import BOOT_UP, PATIENCE, Master, Relay, Simulator, nodectl
 
 #: The personality that is checked in a usual run; --thorough checks all.
 CHECKED = ["pressure", "lift", "encoder", "combined"] if "THOROUGH" in os.environ else ["pressure"]
@@ -73,4 +73,23 @@ def test_an_interrupted_check_leaves_what_the_node_had(personality: str, only: s
     assert nodectl(simulator, "dump", node=5).stdout == before
     assert nodectl(simulator, "nmt", "reset", node=5).returncode == 0
     assert nodectl(simulator, "dump", node=5).stdout == before, "what was saved is saved"
+    simulator.quit()
+
+
+def test_a_second_signal_ends_a_check_at_once():
+    simulator = Simulator("--node", "5:pressure", speed="real")
+    # The node has booted before the check makes it boot.
+    assert nodectl(simulator, "read", "1000", node=5).returncode == 0
+    master = Master(simulator)
+    boot_up = master.listen(0x705)
+    command = [os.environ["NODECTL_COMMAND"], "--bus", f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0", "--node", "5"]
+    process = subprocess.Popen([*command, "check", "--yes", "--only", "STO"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    boot_up.until(lambda data: data == BOOT_UP)
+    process.send_signal(signal.SIGINT)
+    assert "a second Ctrl-C ends at once" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, error
+    assert error.startswith("ended at once: node 5 may have values") and "its saved parameters may be the defaults" in error, error
+    master.close()
     simulator.quit()

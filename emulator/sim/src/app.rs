@@ -1,7 +1,7 @@
 //! The application `cargo sim`: builds the world from the command line, runs and displays it, and returns the summary.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -32,6 +32,19 @@ const ANY_PORT: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0)
 
 /// Period of serving clients, commands and the display, in virtual time.
 const STEP: Time = Time::from_millis(1);
+
+/// The standard output cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write the standard output: {0}")]
+pub struct Output(io::Error);
+
+impl Output {
+    /// Whether the reader has closed its end, as `head` does.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.0.kind() == io::ErrorKind::BrokenPipe
+    }
+}
 
 /// A running simulation.
 struct App {
@@ -101,10 +114,10 @@ impl App {
             boards: world.boards(),
         };
         let display = if options.json {
-            println!("{}", greeting.json());
+            writeln!(io::stdout(), "{}", greeting.json()).map_err(Output)?;
             Display::quiet()
         } else {
-            Display::open(&greeting.lines())?
+            Display::open(&greeting.lines()).map_err(Output)?
         };
         if options.speed == Speed::Max {
             world.measure_host_time();
@@ -172,10 +185,10 @@ impl App {
     fn show(&mut self) -> Result<()> {
         for line in self.world.take_log() {
             if line.level >= self.options.log {
-                self.display.log(&line)?;
+                self.display.log(&line).map_err(Output)?;
             }
         }
-        let typed = self.display.update(self.world.now(), || self.world.status())?;
+        let typed = self.display.update(self.world.now(), || self.world.status()).map_err(Output)?;
         if let Some(command) = typed {
             self.obey(command);
         }

@@ -9,6 +9,20 @@ use crate::cli::Options;
 use crate::console;
 use crate::gateway::BUS_NAME;
 
+/// The highest node-ID of CiA 301.
+const LAST_NODE_ID: u8 = 127;
+
+/// The line of the example where no board has a node-ID.
+const FIND: &str = "        network.lss.fast_scan()";
+
+/// The lines of the example that use a node.
+fn example(node: u8) -> Vec<String> {
+    vec![
+        format!("        node = network.add_node({node}, canopen.ObjectDictionary())"),
+        "        node.sdo.upload(0x1000, 0).hex(); node.nmt.state = 'OPERATIONAL'".to_owned(),
+    ]
+}
+
 /// The content of the greeting, with the addresses that are actually served.
 pub(crate) struct Greeting<'a> {
     pub(crate) options: &'a Options,
@@ -26,7 +40,6 @@ impl Greeting<'_> {
         let Greeting { options, socketcand, slcan, control, page, boards } = *self;
         let nodes: Vec<String> =
             options.nodes.iter().map(|node| format!("{} ({})", node.id, node.personality)).collect();
-        let first = options.nodes.first().map_or(1, |node| node.id);
         let (host, port) = (socketcand.ip(), socketcand.port());
         let mut lines = vec![
             format!(
@@ -38,11 +51,14 @@ impl Greeting<'_> {
             format!(
                 "        network.connect(interface='socketcand', host='{host}', port={port}, channel='{BUS_NAME}')"
             ),
-            format!("        node = network.add_node({first}, canopen.ObjectDictionary())"),
-            "        node.sdo.upload(0x1000, 0).hex(); node.nmt.state = 'OPERATIONAL'".to_owned(),
         ];
+        // Boards without a node-ID wait for LSS.
+        let first = options.nodes.iter().map(|node| node.id).find(|id| *id <= LAST_NODE_ID);
+        lines.extend(first.map_or_else(|| vec![FIND.to_owned()], example));
         lines.push(match &options.socketcan {
-            Some(name) => format!("can-utils: candump -ta {name}; cansend {name} 000#01{first:02X}"),
+            Some(name) => {
+                format!("can-utils: candump -ta {name}; cansend {name} 000#01{:02X}", first.unwrap_or(0))
+            }
             None => {
                 format!("can-utils: socketcandcl -i {BUS_NAME},vcan0 -s {host} -p {port} & candump -ta vcan0")
             }

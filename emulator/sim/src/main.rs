@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
+use sim::app::Output;
 use sim::cli::Options;
 
 /// Exit status for an error that the user can correct: a flag, a file, a port in use.
@@ -24,6 +25,8 @@ fn main() -> ExitCode {
     let json = options.json;
     let summary = match sim::app::run(options) {
         Ok(summary) => summary,
+        // The reader has seen enough, as `head` does.
+        Err(error) if error.downcast_ref().is_some_and(Output::is_closed) => return ExitCode::SUCCESS,
         Err(error) => return refuse(&format!("error: {error:#}"), json),
     };
     let text = if json { format!("{}\n", serde_json::json!(summary)) } else { summary.to_string() };
@@ -34,11 +37,12 @@ fn main() -> ExitCode {
 
 /// Reports an error like `nodectl`: with --json, as an object on the standard output.
 fn refuse(line: &str, json: bool) -> ExitCode {
-    if json {
+    // The reader may have closed the output: `println!` and `eprintln!` would panic.
+    let _ = if json {
         let error = line.strip_prefix("error: ").unwrap_or(line);
-        println!("{}", serde_json::json!({ "error": error, "exit_code": USAGE }));
+        writeln!(io::stdout(), "{}", serde_json::json!({ "error": error, "exit_code": USAGE }))
     } else {
-        eprintln!("{line}");
-    }
+        writeln!(io::stderr(), "{line}")
+    };
     ExitCode::from(USAGE)
 }

@@ -60,3 +60,61 @@ fn help_is_no_error() {
     assert!(output.status.success());
     assert!(String::from_utf8(output.stdout).unwrap().contains("cargo sim [OPTIONS]"));
 }
+
+/// The images of the boards; `None` where they are not built.
+fn images() -> Option<[String; 2]> {
+    let folder = std::env::var("NODE_IMAGES").ok()?;
+    let paths = ["bootloader", "firmware"].map(|name| format!("{folder}/{name}"));
+    paths.iter().all(|path| std::path::Path::new(path).exists()).then_some(paths)
+}
+
+/// A simulator of a second with these flags and this standard output.
+fn run(flags: &[&str], stdout: Stdio) -> Option<std::process::Child> {
+    let [bootloader, firmware] = images()?;
+    let always =
+        ["--bootloader", &bootloader, "--firmware", &firmware, "--socketcand", "127.0.0.1:0", "--no-page"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sim"));
+    command.args(always).args(["--for", "2", "--speed", "max"]).args(flags);
+    Some(command.stdin(Stdio::null()).stdout(stdout).stderr(Stdio::piped()).spawn().unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_an_error_and_no_panic() {
+    for flags in [&["--json"][..], &[]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let Some(child) = run(flags, full.into()) else { return };
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{flags:?}: {stderr}");
+        assert!(!stderr.contains("panicked"), "{flags:?}: {stderr}");
+    }
+}
+
+#[test]
+fn a_closed_standard_output_ends_the_run_without_a_word() {
+    for flags in [&["--json"][..], &["--node", "201:pressure@auto"], &[]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let Some(child) = run(flags, writer.into()) else { return };
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{flags:?}: {stderr}");
+        assert!(!stderr.contains("rror"), "{flags:?}: {stderr}");
+    }
+}
+
+/// No node has ID 201: CiA 301 has 1 to 127.
+#[test]
+fn the_example_uses_a_node_id_only_where_there_is_one() {
+    for (nodes, expected, other) in [
+        (&["--node", "201:pressure"][..], "network.lss.fast_scan()", "add_node"),
+        (&["--node", "201:pressure", "--node", "9:encoder"], "network.add_node(9, ", "fast_scan"),
+        (&[], "network.add_node(1, ", "fast_scan"),
+    ] {
+        let Some(child) = run(nodes, Stdio::piped()) else { return };
+        let output = child.wait_with_output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.contains(expected) && !text.contains(other), "{nodes:?}: {text}");
+    }
+}

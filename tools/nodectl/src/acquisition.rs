@@ -1,11 +1,12 @@
 //! Live values of a node: from TPDOs where a TPDO carries the object, else by periodic SDO reads.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use canopen::emcy::Message;
 use canopen::nmt::{Command, State};
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, Instant, NodeId};
+use canopen::{Duration, Frame, Instant, NodeId};
 use eds::{Class, DataType};
 use thiserror::Error;
 
@@ -15,6 +16,7 @@ use crate::object::at;
 use crate::quantity::Quantity;
 use crate::sdo::{self, Client, Options};
 use crate::tpdo::{self, Tpdo};
+use crate::trace::{Knowledge, Transfers};
 use crate::value::{Value, guess};
 use crate::{Catalogue, Network, meaning, nmt};
 
@@ -83,13 +85,32 @@ pub enum Interruption {
     Bus(#[from] BusError),
 }
 
+/// The units are read again this long after a boot-up of the node: a master configures the node first.
+const AFTER_BOOT: Duration = Duration::from_millis(500);
+/// The time between two tries to read the units.
+const AGAIN: Duration = Duration::from_millis(1000);
+
+/// What frames have told, in their order.
+enum News {
+    /// The bytes of a signal.
+    Value { at: Instant, signal: usize, bytes: Vec<u8> },
+    /// The bytes of an object that a client has read or written.
+    Told { object: Multiplexer, bytes: Vec<u8> },
+}
+
 /// An acquisition under way.
 pub struct Acquisition<'n> {
     network: &'n mut Network,
     setup: Setup,
     tpdos: Vec<Tpdo>,
     signals: Vec<Signal>,
-    ready: VecDeque<Sample>,
+    /// The numbers that the units of the signals depend on.
+    knowledge: Knowledge,
+    /// The transfers of other clients: on the default channel, and on the additional one.
+    transfers: [Transfers; 2],
+    news: VecDeque<News>,
+    /// When the numbers for the units are read again; `None` while they are known.
+    refresh: Option<Instant>,
     /// When the polled signals are read next.
     due: Instant,
     /// The NMT state of the node, once a heartbeat has told it.
@@ -112,12 +133,13 @@ impl<'n> Acquisition<'n> {
     pub fn open(
         network: &'n mut Network,
         setup: Setup,
-        catalogue: &Catalogue,
+        catalogue: &Arc<Catalogue>,
         objects: &[Multiplexer],
     ) -> Result<Acquisition<'n>, Interruption> {
         let deadline = network.own_time() + setup.options.limit;
         let mut client = Client::new(network, setup.node, setup.options).by(deadline);
-        let (tpdos, signals) = survey(&mut client, catalogue, objects)?;
+        let mut knowledge = Knowledge::new(Arc::clone(catalogue));
+        let (tpdos, signals) = survey_with(&mut client, &mut knowledge, objects)?;
         network.forget();
         if setup.start {
             nmt::send(network, Command::Start, Some(setup.node))?;
@@ -128,7 +150,10 @@ impl<'n> Acquisition<'n> {
             setup,
             tpdos,
             signals,
-            ready: VecDeque::new(),
+            knowledge,
+            transfers: Default::default(),
+            news: VecDeque::new(),
+            refresh: None,
             due,
             state: None,
             emergency: None,
@@ -138,7 +163,7 @@ impl<'n> Acquisition<'n> {
         })
     }
 
-    /// The signals that are followed.
+    /// The signals that are followed, with the units of the newest sample.
     #[must_use]
     pub fn signals(&self) -> &[Signal] {
         &self.signals
@@ -210,20 +235,79 @@ impl<'n> Acquisition<'n> {
     /// SDO errors, and a bus that is lost.
     pub fn next(&mut self, until: Instant) -> Result<Option<Sample>, Interruption> {
         let has_polled = self.signals.iter().any(|signal| signal.tpdo.is_none());
-        while self.ready.is_empty() {
-            if has_polled && self.network.now() >= self.due {
+        loop {
+            if let Some(sample) = self.ready() {
+                self.has_values = true;
+                return Ok(Some(sample));
+            }
+            let now = self.network.now();
+            if self.refresh.is_some_and(|due| now >= due) {
+                self.read_units()?;
+                continue;
+            }
+            if has_polled && now >= self.due {
                 self.poll()?;
                 continue;
             }
-            let wake = if has_polled { until.min(self.due) } else { until };
+            let wake = until.min(self.refresh.unwrap_or(Instant::NEVER));
+            let wake = if has_polled { wake.min(self.due) } else { wake };
             match self.network.receive(wake)? {
                 Some(received) => self.take(&received),
-                None if self.network.now() >= until => break,
+                None if self.network.now() >= until => return Ok(None),
                 None => (),
             }
         }
-        self.has_values |= !self.ready.is_empty();
-        Ok(self.ready.pop_front())
+    }
+
+    /// The next sample of the frames that were taken, in the unit that was told before it.
+    fn ready(&mut self) -> Option<Sample> {
+        loop {
+            match self.news.pop_front()? {
+                News::Told { object, bytes } => self.hear(object, &bytes),
+                News::Value { at, signal, bytes } => {
+                    let value = self.signals[signal].decode(&bytes);
+                    return Some(Sample { at, signal, value });
+                }
+            }
+        }
+    }
+
+    /// The objects that the units of the signals depend on.
+    fn sources(&self) -> Vec<Multiplexer> {
+        let catalogue = self.knowledge.catalogue();
+        self.signals.iter().flat_map(|signal| Quantity::sources(catalogue, signal.at)).collect()
+    }
+
+    /// Takes a number that the node has told or taken. Units that depend on it change.
+    fn hear(&mut self, object: Multiplexer, bytes: &[u8]) {
+        if !self.sources().contains(&object) {
+            return;
+        }
+        self.knowledge.tell(object, bytes);
+        for signal in &mut self.signals {
+            if let Some(quantity) = self.knowledge.measured(signal.at) {
+                signal.measure(quantity);
+            }
+        }
+    }
+
+    /// Reads the numbers for the units again: values that are not saved are lost with a restart.
+    fn read_units(&mut self) -> Result<(), sdo::Error> {
+        self.refresh = None;
+        let mut sources = self.sources();
+        sources.dedup();
+        for object in sources {
+            match Client::new(self.network, self.setup.node, self.setup.options).upload(object) {
+                Ok(bytes) => self.hear(object, &bytes),
+                Err(error) if error.may_pass() && !error.is_bus_lost() => {
+                    self.refresh = Some(self.network.now() + AGAIN);
+                    break;
+                }
+                Err(error) if error.abort().is_some() => (),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
 
     /// Takes the values out of a frame.
@@ -237,13 +321,30 @@ impl<'n> Acquisition<'n> {
         }
         if let Some(heard) = Heartbeat::parse(frame).filter(|heard| heard.node == self.setup.node) {
             self.state = Some(heard.state);
+            if heard.state == State::Initialising {
+                self.refresh = Some(self.network.now() + AFTER_BOOT);
+            }
+        }
+        if let Some((node, is_additional, frame)) = self.network.sdo(frame)
+            && node == self.setup.node
+        {
+            self.overhear(is_additional, &frame, received.at);
         }
         for tpdo in self.tpdos.iter().filter(|tpdo| tpdo.id == frame.id()) {
             for (at, bytes) in tpdo.values(frame.data()) {
                 let is_it = |signal: &Signal| signal.at == at && signal.tpdo == Some(tpdo.number);
                 let Some(signal) = self.signals.iter().position(is_it) else { continue };
-                let value = self.signals[signal].decode(&bytes);
-                self.ready.push_back(Sample { at: received.at, signal, value });
+                self.news.push_back(News::Value { at: received.at, signal, bytes });
+            }
+        }
+    }
+
+    /// Takes an SDO frame of another client, or an answer.
+    fn overhear(&mut self, is_additional: bool, frame: &Frame, at: Instant) {
+        let transfers = &mut self.transfers[usize::from(is_additional)];
+        for ended in transfers.on_frame(self.setup.node, frame, at) {
+            if let Some(bytes) = ended.value() {
+                self.news.push_back(News::Told { object: ended.at, bytes: bytes.to_vec() });
             }
         }
     }
@@ -258,13 +359,12 @@ impl<'n> Acquisition<'n> {
                 continue;
             }
             let bytes = Client::new(self.network, self.setup.node, self.setup.options).upload(signal.at)?;
-            let value = signal.decode(&bytes);
             // The answer is the newest frame. The frames before it are taken first, so that times do not go backwards.
             let at = self.network.newest_stamp().unwrap_or(self.network.now());
             while let Some(received) = self.network.take_kept() {
                 self.take(&received);
             }
-            self.ready.push_back(Sample { at, signal: number, value });
+            self.news.push_back(News::Value { at, signal: number, bytes });
         }
         Ok(())
     }
@@ -344,14 +444,23 @@ impl Signal {
 /// SDO errors.
 pub fn survey(
     client: &mut Client,
-    catalogue: &Catalogue,
+    catalogue: &Arc<Catalogue>,
     objects: &[Multiplexer],
 ) -> Result<(Vec<Tpdo>, Vec<Signal>), sdo::Error> {
-    let tpdos = tpdo::read(client, catalogue)?;
+    survey_with(client, &mut Knowledge::new(Arc::clone(catalogue)), objects)
+}
+
+/// The same; the numbers that the units depend on are kept.
+fn survey_with(
+    client: &mut Client,
+    knowledge: &mut Knowledge,
+    objects: &[Multiplexer],
+) -> Result<(Vec<Tpdo>, Vec<Signal>), sdo::Error> {
+    let tpdos = tpdo::read(client, knowledge.catalogue())?;
     let objects = if objects.is_empty() { mapped(&tpdos) } else { objects.to_vec() };
     let mut signals = Vec::new();
     for at in objects {
-        signals.push(signal(client, catalogue, &tpdos, at)?);
+        signals.push(signal(client, knowledge, &tpdos, at)?);
     }
     Ok((tpdos, signals))
 }
@@ -370,13 +479,14 @@ fn mapped(tpdos: &[Tpdo]) -> Vec<Multiplexer> {
 
 fn signal(
     client: &mut Client,
-    catalogue: &Catalogue,
+    knowledge: &mut Knowledge,
     tpdos: &[Tpdo],
     at: Multiplexer,
 ) -> Result<Signal, sdo::Error> {
     let is_in =
         |tpdo: &&Tpdo| tpdo.mapping.iter().any(|mapped| (mapped.index, mapped.sub) == (at.index, at.sub));
-    let quantity = Quantity::of(client, catalogue, at)?;
+    let quantity = knowledge.ask_quantity(client, at)?;
+    let catalogue = knowledge.catalogue();
     Ok(Signal {
         at,
         name: catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default(),

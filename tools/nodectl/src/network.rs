@@ -255,6 +255,12 @@ impl Network {
         }
     }
 
+    /// The node of an SDO frame, whether its channel is an additional one, and the frame with its CAN-ID on the default
+    /// channel; `None` for any other frame.
+    pub(crate) fn sdo(&self, frame: &Frame) -> Option<(NodeId, bool, Frame)> {
+        self.others.sdo(frame)
+    }
+
     /// Whether another client has sent a request on the SDO channel of a node since an instant.
     pub(crate) fn has_other_request_since(&self, node: NodeId, begin: Instant) -> bool {
         self.others.heard(node).is_some_and(|heard| heard.request >= begin)

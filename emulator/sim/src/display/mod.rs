@@ -6,7 +6,7 @@ mod screen;
 mod tpdo;
 mod view;
 
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal, Write};
 
 use canbus::Time;
 
@@ -53,7 +53,7 @@ impl Display {
         match &mut self.0 {
             Kind::Screen(screen) => screen.log(log_line(line)),
             Kind::Plain(plain) => plain.log(line)?,
-            Kind::Quiet => eprintln!("{}", log_line(line)),
+            Kind::Quiet => note(&log_line(line)),
         }
         Ok(())
     }
@@ -62,7 +62,7 @@ impl Display {
     pub fn say(&mut self, text: String) {
         match &mut self.0 {
             Kind::Screen(screen) => screen.log(text),
-            Kind::Plain(_) | Kind::Quiet => eprintln!("{text}"),
+            Kind::Plain(_) | Kind::Quiet => note(&text),
         }
     }
 
@@ -74,6 +74,11 @@ impl Display {
             Kind::Quiet => Ok(None),
         }
     }
+}
+
+/// Writes a line to the standard error output. A closed output is no error: `eprintln!` would panic.
+fn note(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }
 
 fn log_line(line: &Line) -> String {

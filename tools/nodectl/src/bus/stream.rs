@@ -15,6 +15,9 @@ const CONNECT: Duration = Duration::from_secs(3);
 /// The shortest time-out of a read; 0 would mean no time-out.
 const SHORTEST: Duration = Duration::from_millis(1);
 
+/// What the C library says of a file that is no serial port.
+const NO_TERMINAL: &str = "Not a typewriter";
+
 /// A source of bytes that can be read with a time-out.
 trait Port: Read + Write {
     /// Reads some bytes within this time. With a time of 0, bytes that are there already.
@@ -68,7 +71,16 @@ impl Stream {
 
     /// Opens a serial port. The common USB adapters ignore the line speed.
     pub(super) fn serial(device: &str) -> io::Result<Stream> {
-        let port = serialport::new(device, 115_200).timeout(SHORTEST).open()?;
+        let port = serialport::new(device, 115_200).timeout(SHORTEST).open().map_err(|error| {
+            // The operating system: "not a typewriter".
+            let is_other =
+                error.description == NO_TERMINAL || error.description.starts_with("Inappropriate ioctl");
+            if is_other {
+                io::Error::new(ErrorKind::InvalidInput, "it is no serial port")
+            } else {
+                error.into()
+            }
+        })?;
         Ok(Stream { port: Box::new(port) })
     }
 

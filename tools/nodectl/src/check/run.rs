@@ -87,7 +87,10 @@ pub fn run(subject: &mut Subject<'_>, options: &Options, mut progress: impl FnMu
         results.push(result);
     }
     let is_interrupted = results.iter().any(|result| result.verdict == Verdict::Skipped(INTERRUPTED.into()));
-    let left_behind = subject.sheltered(|subject| subject.end(&before))?;
+    let mut left_behind = subject.sheltered(|subject| subject.end(&before))?;
+    left_behind.append(&mut subject.not_restored);
+    left_behind.sort();
+    left_behind.dedup();
     Ok(Run { node: subject.node(), results, left_behind, is_interrupted })
 }
 
@@ -128,7 +131,7 @@ fn one(subject: &mut Subject<'_>, check: Check) -> std::result::Result<Result, B
 fn once(subject: &mut Subject<'_>, check: Check) -> std::result::Result<Verdict, BusError> {
     subject.network.begin_log();
     let tried = subject.tidy().and_then(|()| (check.run)(subject));
-    let tidied = subject.sheltered(|subject| subject.tidy().and_then(|()| subject.put_back()));
+    let tidied = subject.restoring(|subject| subject.tidy().and_then(|()| subject.put_back()));
     // A skipped check has to restore its values, too.
     let outcome = match (tried, tidied) {
         (Ok(()) | Err(Stop::Skipped(_)), Err(stop)) => Err(stop),
@@ -280,7 +283,7 @@ impl Subject<'_> {
         // The values that the function has written need no restoring of their own: all saved values are written back
         // below.
         self.written.truncate(kept);
-        self.sheltered(|s| s.save_again(&saved))?;
+        self.restoring(|s| s.save_again(&saved))?;
         done
     }
 

@@ -135,7 +135,7 @@ impl Check {
         session.network.set_channel(node, None);
         let setup = Setup { node, sheet, timeout: session.options.timeout(), boot: BOOT };
         let bar = bar(options.checks.len());
-        let interruption = interruption();
+        let interruption = interruption(at_once(node, options.allowed));
         let is_interrupted = move || interruption.load(Ordering::Relaxed);
         let mut subject = Subject::new(&mut session.network, setup).with_interruption(is_interrupted);
         let run = check::run(&mut subject, &options, |result| {
@@ -192,18 +192,31 @@ impl Check {
     }
 }
 
-/// Whether a signal has come (Ctrl-C, SIGTERM). The second one ends the program at once.
-fn interruption() -> Arc<AtomicBool> {
+/// Whether a signal has come (Ctrl-C, SIGTERM). The second one ends the program at once, with these words.
+fn interruption(at_once: String) -> Arc<AtomicBool> {
     let is_interrupted = Arc::new(AtomicBool::new(false));
     let told = Arc::clone(&is_interrupted);
     // Only one handler is possible; a program that has one already is not interrupted.
     let _ = ctrlc::set_handler(move || {
         if told.swap(true, Ordering::Relaxed) {
+            note(&at_once);
             std::process::exit(failure::INTERRUPTED.into());
         }
         note("interrupted: the device gets its values back; a second Ctrl-C ends at once");
     });
     is_interrupted
+}
+
+/// What a run may leave changed that ends before the device has its values back.
+fn at_once(node: NodeId, allowed: Effect) -> String {
+    let saved = match allowed {
+        Effect::Stores => "; its saved parameters may be the defaults or those of a check",
+        _ => "",
+    };
+    format!(
+        "ended at once: node {} may have values and the NMT state of a check until its next reset{saved}",
+        node.get()
+    )
 }
 
 /// A progress bar, which is only visible on a terminal.

@@ -40,7 +40,9 @@ mod trial;
 mod update;
 mod write;
 
-use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use failure::Failure;
 pub use options::Options;
@@ -98,6 +100,18 @@ enum Command {
 }
 
 impl Cli {
+    /// Parses a command line. A negative number after an option is the value of the option.
+    ///
+    /// # Errors
+    /// The error of the command line, or the help.
+    pub fn from_words<W: Into<OsString> + Clone>(
+        words: impl IntoIterator<Item = W>,
+    ) -> Result<Cli, clap::Error> {
+        let mut command = with_negative_numbers(Cli::command());
+        let mut matches = command.try_get_matches_from_mut(words)?;
+        Cli::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
+    }
+
     /// Runs the command on the bus of the options.
     ///
     /// # Errors
@@ -167,4 +181,13 @@ impl Cli {
             Command::Man(man) => man.run(session),
         }
     }
+}
+
+/// The command, with negative numbers as values of its arguments.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let command = command.mut_args(|arg| {
+        let takes_values = arg.get_action().takes_values();
+        if takes_values { arg.allow_negative_numbers(true) } else { arg }
+    });
+    command.mut_subcommands(with_negative_numbers)
 }

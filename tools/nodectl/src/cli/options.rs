@@ -55,7 +55,7 @@ pub struct Options {
 }
 
 /// A bit rate of CANopen or of slcan.
-fn parse_bit_rate(text: &str) -> Result<u16, String> {
+pub(super) fn parse_bit_rate(text: &str) -> Result<u16, String> {
     let rate = text.trim().parse().ok().filter(|rate| BIT_RATES.contains(rate));
     rate.ok_or_else(|| format!("\"{text}\" is no bit rate of CAN in kbit/s, {BIT_RATES:?}"))
 }

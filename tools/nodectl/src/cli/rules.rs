@@ -9,6 +9,7 @@ use monitor::{Breach, Monitor, Rule, Sender};
 use serde::Serialize;
 
 use super::node_set::NodeSet;
+use super::options::parse_bit_rate;
 use super::traffic::{Listening, Records};
 use super::{Failure, Session};
 use crate::rules::{self, Device};
@@ -41,7 +42,7 @@ pub(super) struct Rules {
     factory: bool,
 
     /// Bit rate of the bus in kbit/s; without it, the traffic shows the bit rate.
-    #[arg(long, value_name = "KBIT/S")]
+    #[arg(long, value_name = "KBIT/S", value_parser = parse_bit_rate)]
     rate: Option<u16>,
 
     /// Rules that are not applied, by name (heartbeat-late,emcy).
@@ -134,7 +135,7 @@ impl Rules {
     fn monitor(&self, session: &mut Session) -> Result<Monitor, Failure> {
         let mut monitor = Monitor::new();
         if let Some(kbit) = self.rate {
-            monitor.set_bit_rate(u32::from(kbit.max(1)) * 1000);
+            monitor.set_bit_rate(u32::from(kbit) * 1000);
         }
         let nodes: Vec<NodeId> = match &self.of {
             NodeSet::All => (1..=127).filter_map(NodeId::new).collect(),

@@ -7,7 +7,6 @@ use clap::Args;
 use serde::Serialize;
 
 use super::output::hex;
-use super::session::silence;
 use super::{Failure, Session};
 use crate::lift::is_lift;
 use crate::network::Heard;
@@ -47,10 +46,15 @@ impl Scan {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let time = canopen::Duration::from_millis(self.listen.into());
         let found = scan(&mut session.network, time)?;
-        let mut nodes = Vec::new();
+        let (mut nodes, mut incomplete) = (Vec::new(), None);
         for (node, presence) in found {
             session.begin();
-            nodes.push(row(session, node, presence)?);
+            let mut row = row(node, presence);
+            if let Err(failure) = identify(session, node, &mut row) {
+                let before = incomplete.replace(failure);
+                before.map_or(Ok(()), |failure| session.tell(&failure))?;
+            }
+            nodes.push(row);
         }
         let is_empty = nodes.is_empty();
         let answering: Vec<u8> =
@@ -60,32 +64,36 @@ impl Scan {
         let is_there = |(node, heard): &(NodeId, Heard)| {
             !answering.contains(&node.get()) && (heard.is_sure || !has_lift)
         };
-        for (node, heard) in session.network.all_heard().filter(is_there) {
-            note(format_args!("node {}: {}", node.get(), silence(node, Some(heard))));
+        for (node, _) in session.network.all_heard().filter(is_there) {
+            note(format_args!("node {}: {}", node.get(), session.silence(node)));
         }
         if is_empty {
             return Err(Failure::Silence(NOBODY.to_owned()));
         }
-        Ok(())
+        incomplete.map_or(Ok(()), Err)
     }
 }
 
 /// The row of a node. A node that does not answer SDO, for example a stopped one, gets a row, too.
-fn row(session: &mut Session, node: NodeId, presence: Presence) -> Result<Row, Failure> {
-    let mut row = Row {
+fn row(node: NodeId, presence: Presence) -> Row {
+    Row {
         node: node.get(),
         state: presence.state.map(heartbeat::words),
         device_type: presence.device_type,
         vendor: None,
         product: None,
         name: None,
-    };
-    if presence.device_type.is_some() {
+    }
+}
+
+/// Reads the identity of a node that answers SDO.
+fn identify(session: &mut Session, node: NodeId, row: &mut Row) -> Result<(), Failure> {
+    if row.device_type.is_some() {
         row.vendor = session.word(node, at(0x1018, 1))?;
         row.product = session.word(node, at(0x1018, 2))?;
         row.name = session.optional(node, at(0x1008, 0))?.map(|bytes| value::text(&bytes));
     }
-    Ok(row)
+    Ok(())
 }
 
 impl fmt::Display for Found {

@@ -33,6 +33,9 @@ const WARNINGS: usize = 5;
 /// How long to listen before the first request. The frames of a running transfer come more often.
 const LISTEN: Duration = Duration::from_millis(50);
 
+/// A client counts as present for this time after its last request.
+const RECENT: Duration = Duration::from_millis(5000);
+
 /// A factor on the time limit for reading a whole dictionary. A slow bus needs 20 s for 400 objects; this limit is
 /// three times as long.
 const MANY: u64 = 6;
@@ -273,7 +276,7 @@ impl Session {
             return self.options.bus.lost_hint();
         }
         if error.is_silence() {
-            return Some(silence(error.node, self.network.heard(error.node)));
+            return Some(self.silence(error.node));
         }
         let code = error.abort()?.0;
         let catalogue = self.catalogues.get(&error.node);
@@ -312,6 +315,21 @@ impl Session {
         }
     }
 
+    /// Whether another client uses the SDO server of a node.
+    pub(super) fn has_other_client(&self, node: NodeId) -> bool {
+        let since = Instant(self.network.now().0.saturating_sub(RECENT.0));
+        self.network.has_other_request_since(node, since)
+    }
+
+    /// Why a node may not answer, and what the user can do.
+    pub(super) fn silence(&self, node: NodeId) -> String {
+        if self.has_other_client(node) {
+            return "another client uses the SDO server of the node: try again when it has finished"
+                .to_owned();
+        }
+        silence(node, self.network.heard(node))
+    }
+
     /// Prints a failure that does not end the command.
     pub(super) fn tell(&mut self, failure: &Failure) -> Result<(), Failure> {
         if self.options.json {
@@ -328,7 +346,7 @@ impl Session {
 }
 
 /// Why a node may not answer, and what the user can do.
-pub(super) fn silence(node: NodeId, heard: Option<Heard>) -> String {
+fn silence(node: NodeId, heard: Option<Heard>) -> String {
     let node = node.get();
     match heard {
         Some(Heard { state: Some(State::Stopped), .. }) => {

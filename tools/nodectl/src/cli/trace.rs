@@ -18,7 +18,7 @@ use super::traffic::{Listening, Records};
 use super::{Failure, Session};
 use crate::Catalogue;
 use crate::scan::scan;
-use crate::text::{hex_digits, visible};
+use crate::text::{hex_digits, note, visible};
 use crate::trace::{Decoder, Foreign, Kind, Knowledge, Line, Record, Shown};
 use crate::value::Value;
 
@@ -26,6 +26,9 @@ use crate::value::Value;
 const PATIENCE: Duration = Duration::from_millis(200);
 /// How long to listen for nodes before their objects are read.
 const LISTEN: Duration = Duration::from_millis(300);
+
+/// How often a node is asked for its PDOs while another client uses its SDO server.
+const TRIES: usize = 3;
 
 /// Shows the traffic on the bus: every frame decoded, with names, values and units; a transfer of several frames is one
 /// line.
@@ -129,21 +132,49 @@ impl Trace {
         }
         if self.file.is_none() && !self.silent {
             for node in self.present(session)? {
-                session.begin();
-                let catalogue = session.catalogue(node)?;
-                match Knowledge::ask(&mut session.client(node), Arc::clone(&catalogue)) {
+                match Trace::survey(session, node) {
                     Ok(knowledge) => decoder.know(node, knowledge),
-                    Err(error) if error.is_silence() => return Err(session.named(error)),
-                    Err(error) => {
+                    Err(failure) if failure.is_silence() => return Err(failure),
+                    Err(failure) => {
                         // Until the trace shows other values, the defaults of the data sheet apply.
-                        decoder.know(node, Knowledge::new(catalogue));
-                        let failure = session.named(error);
+                        if session.knows(node) {
+                            decoder.know(node, Knowledge::new(session.catalogue(node)?));
+                        }
+                        note(format_args!(
+                            "node {}: the mapping of its PDOs and their units could not be read",
+                            node.get()
+                        ));
                         session.tell(&failure)?;
                     }
                 }
             }
+            // The trace and its time begin now.
+            session.network.forget();
         }
         Ok(decoder)
+    }
+
+    /// Reads the PDOs of a node and the units of their objects. Other clients may use the node at the same time.
+    fn survey(session: &mut Session, node: NodeId) -> Result<Knowledge, Failure> {
+        let mut tries = 0;
+        loop {
+            // Beside another client, each transfer waits for its turn.
+            if session.has_other_client(node) {
+                session.begin_all();
+            } else {
+                session.begin();
+            }
+            let catalogue = session.catalogue(node);
+            let asked = catalogue.and_then(|catalogue| {
+                let asked = Knowledge::ask(&mut session.client(node), catalogue);
+                asked.map_err(|error| session.named(error))
+            });
+            tries += 1;
+            match asked {
+                Err(Failure::Sdo(error)) if error.is_busy() && tries < TRIES => (),
+                asked => return asked,
+            }
+        }
     }
 
     /// The nodes that the filter names.
@@ -156,11 +187,17 @@ impl Trace {
 
     /// The nodes of the filter that answer.
     fn present(&self, session: &mut Session) -> Result<Vec<NodeId>, Failure> {
-        let found = scan(&mut session.network, LISTEN)?;
+        let mut found = scan(&mut session.network, LISTEN)?;
         session.network.forget();
-        let answers = found.into_iter().filter(|(_, presence)| presence.device_type.is_some());
         let named = self.named();
-        Ok(answers.map(|(node, _)| node).filter(|node| named.contains(node)).collect())
+        found.retain(|node, _| named.contains(node));
+        for (node, _) in found.iter().filter(|(_, presence)| presence.device_type.is_none()) {
+            if session.has_other_client(*node) {
+                note(format_args!("node {}: {}", node.get(), session.silence(*node)));
+            }
+        }
+        found.retain(|_, presence| presence.device_type.is_some());
+        Ok(found.into_keys().collect())
     }
 
     /// Whether the filter has a service and a node.

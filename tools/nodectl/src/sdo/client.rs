@@ -11,6 +11,9 @@ use super::memory::Memory;
 use super::{Cause, Error, Options};
 use crate::network::Network;
 
+/// How often an object is read whose transfers the server drops for those of another client.
+const TRIES: u64 = 4;
+
 /// The SDO client of one node.
 pub struct Client<'n> {
     network: &'n mut Network,
@@ -37,14 +40,24 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        let begin = self.network.now();
-        match self.upload_once(at) {
-            // Another client has asked in the same moment, and the server has dropped this transfer for the other one.
-            Err(error) if error.is_disturbed() && self.network.has_other_request_since(self.node, begin) => {
-                self.network.pause(turn()).map_err(|bus| Error { cause: bus.into(), ..error })?;
-                self.upload_once(at)
+        let mut tries = 0;
+        loop {
+            let begin = self.network.now();
+            let error = match self.upload_once(at) {
+                Ok(bytes) => return Ok(bytes),
+                Err(error) => error,
+            };
+            // Another client has asked in the same moment, and the server has dropped this transfer for the other one. Its
+            // abort is no answer to this request.
+            if !(error.may_be_dropped() && self.network.has_other_request_since(self.node, begin)) {
+                return Err(error);
             }
-            result => result,
+            tries += 1;
+            if tries == TRIES {
+                return Err(Error { cause: Cause::Busy, ..error });
+            }
+            let pause = Duration(turn().0 * tries);
+            self.network.pause(pause).map_err(|bus| Error { cause: bus.into(), ..error })?;
         }
     }
 
@@ -183,7 +196,7 @@ impl<'n> Client<'n> {
     }
 }
 
-/// The pause before a second try. It differs between processes, so that two of them do not ask in one moment again.
+/// The pause before the second try; later pauses are longer. It differs between processes, so that two of them do not ask in one moment again.
 fn turn() -> Duration {
     Duration::from_millis(u64::from(std::process::id() % 16) * 5)
 }

@@ -11,6 +11,9 @@ use super::AbortCode;
 use crate::bus::BusError;
 use crate::object::Place;
 
+/// The abort code for the present state of the device (CiA 301, table 22).
+const DEVICE_STATE: u32 = 0x0800_0022;
+
 /// A transfer that failed.
 #[derive(Debug, Error)]
 pub struct Error {
@@ -63,10 +66,21 @@ impl Error {
         matches!(self.cause, Cause::Transfer(sdo::Error::NoAnswer) | Cause::Bus(BusError::Lost(_)))
     }
 
+    /// Whether the server may have dropped the transfer for that of another client.
+    pub(super) fn may_be_dropped(&self) -> bool {
+        self.is_disturbed() || self.abort() == Some(AbortCode(DEVICE_STATE))
+    }
+
     /// Whether a later try may succeed: the node or the bus was silent, or another client was in the way.
     #[must_use]
     pub fn may_pass(&self) -> bool {
         self.is_silence() || self.is_disturbed() || matches!(self.cause, Cause::Busy)
+    }
+
+    /// Whether another client used the SDO server of the node all the time.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        matches!(self.cause, Cause::Busy)
     }
 
     /// Whether the bus is lost.

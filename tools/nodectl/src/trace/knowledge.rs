@@ -70,10 +70,10 @@ impl Knowledge {
         })
     }
 
-    /// Reads the objects that [`Quantity::of`] needs.
-    fn ask_quantity(&mut self, client: &mut Client, of: Multiplexer) -> Result<(), Error> {
+    /// Reads the unit and the decimal point of an object.
+    pub(crate) fn ask_quantity(&mut self, client: &mut Client, of: Multiplexer) -> Result<Quantity, Error> {
         let catalogue = Arc::clone(&self.catalogue);
-        Quantity::by(&catalogue, of, |at| self.fetch(client, at)).map(drop)
+        Quantity::by(&catalogue, of, |at| self.fetch(client, at))
     }
 
     fn fetch(&mut self, client: &mut Client, at: Multiplexer) -> Result<Option<u32>, Error> {

@@ -1,6 +1,5 @@
 //! Tests of the commands in this process: their output and their exit codes.
 
-use clap::Parser;
 use node::Personality;
 use nodectl::cli::{Cli, Failure, Output, Paper, Session};
 
@@ -13,7 +12,7 @@ pub(crate) fn run<S: nodectl::bus::Station + 'static>(
     wire: &Wire<S>,
     line: &[&str],
 ) -> (String, Result<(), Failure>) {
-    let cli = Cli::try_parse_from(std::iter::once(&"nodectl").chain(line)).expect("a command line");
+    let cli = Cli::from_words(std::iter::once(&"nodectl").chain(line)).expect("a command line");
     let paper = Paper::default();
     let output = Output::new(paper.clone(), cli.options.json);
     let result = cli.run_in(&mut Session::with(wire.network(), &cli.options, output));

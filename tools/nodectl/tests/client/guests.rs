@@ -5,7 +5,7 @@ use nodectl::bus::Station;
 use nodectl::object::at;
 use nodectl::sdo::Channel;
 
-use crate::commands::printed;
+use crate::commands::{printed, run};
 use crate::pressure::Pressure;
 use crate::wire::{Answers, Wire, client};
 
@@ -89,9 +89,13 @@ fn a_scan_and_a_trace_beside_another_client_know_the_node() {
         let found = nodectl::scan::scan(&mut wire.network(), Duration::from_millis(300)).expect("a bus");
         let presence = found.get(&canopen::NodeId::new(1).expect("a node-ID")).expect("the node");
         assert_eq!(presence.device_type, Some(0x0002_0194), "pause of {pause} ms");
+        printed(&wire, &["write", "6131:1", "kPa"]);
         printed(&wire, &["nmt", "start"]);
         let lines = printed(&wire, &["trace", "--for", "3", "--kind", "pdo"]);
-        assert!(lines.contains("Pressure process value = "), "pause of {pause} ms: {lines}");
+        assert!(
+            lines.contains("Pressure process value = ") && lines.contains(" kPa"),
+            "pause of {pause} ms: {lines}"
+        );
     }
 }
 
@@ -202,14 +206,19 @@ fn after_a_boot_and_after_silence_the_default_server_is_used() {
 /// A node, and another client that asks in the moment in which this program has begun to read.
 struct Crossing {
     node: Pressure,
-    has_asked: bool,
+    /// How often the other client still asks.
+    left: usize,
+    /// The object whose upload it interrupts.
+    of: [u8; 3],
 }
 
 impl Station for Crossing {
     fn receive(&mut self, received: &Frame, now: Instant, out: &mut impl Transmit) {
         self.node.receive(received, now, out);
-        if received.id() == 0x601 && received.data().starts_with(&[0x40, 0x08, 0x10]) && !self.has_asked {
-            self.has_asked = true;
+        let is_it = received.id() == 0x601
+            && received.data().get(..4) == Some(&[0x40, self.of[0], self.of[1], self.of[2]]);
+        if is_it && self.left > 0 {
+            self.left -= 1;
             let request = frame(0x601, [0x40, 0x17, 0x10, 0, 0, 0, 0, 0]);
             let _: Result<(), QueueFull> = out.send(request);
             self.node.receive(&request, now, out);
@@ -223,10 +232,32 @@ impl Station for Crossing {
 
 #[test]
 fn a_read_that_another_client_has_interrupted_is_tried_again() {
-    let wire = Wire::new(Crossing { node: Pressure::new(1), has_asked: false });
-    let line = printed(&wire, &["read", "1008", "--type", "vs"]);
-    assert!(line.contains("STM32F4 pressure transmitter"), "{line}");
-    assert!(wire.station(|crossing| crossing.has_asked));
+    for left in 1..=3 {
+        let wire = crossing(left);
+        let line = printed(&wire, &["read", "1008", "--type", "vs"]);
+        assert!(line.contains("STM32F4 pressure transmitter"), "{line}");
+        assert_eq!(wire.station(|crossing| crossing.left), 0);
+        let lines = printed(&crossing(left), &["info"]);
+        assert!(lines.starts_with("node 1: STM32F4 pressure transmitter\n"), "{lines}");
+    }
+}
+
+fn crossing(left: usize) -> Wire<Crossing> {
+    Wire::new(Crossing { node: Pressure::new(1), left, of: [0x08, 0x10, 0] })
+}
+
+/// The abort by which the server drops a transfer for another one does not say that the object is absent.
+#[test]
+fn an_object_that_another_client_keeps_from_being_read_is_not_absent() {
+    const WORDS: &str =
+        "1008h:0 \"Manufacturer device name\": another client uses the SDO server of the node";
+    let (lines, result) = run(&crossing(usize::MAX), &["info"]);
+    let failure = result.expect_err("a failure");
+    assert!(failure.exit_code() == 3 && failure.to_string().contains(WORDS), "{failure}: {lines}");
+    let (lines, result) = run(&crossing(usize::MAX), &["scan"]);
+    let failure = result.expect_err("a failure");
+    assert!(failure.exit_code() == 3 && failure.to_string().contains("another client uses"), "{failure}");
+    assert!(lines.contains("00020194h    00000000h  00000001h  -"), "{lines}");
 }
 
 /// A node, and another client that begins a block download in the moment of the first request to the node. The node takes that
@@ -287,4 +318,88 @@ fn a_request_in_the_moment_of_another_clients_block_download_does_not_abort_it()
     let value = client(&mut network, 1).upload(at(0x1017, 0)).expect("a value");
     assert_eq!(value, 1000_u16.to_le_bytes());
     assert_eq!(wire.station(|crossed| crossed.disturbing.clone()), [0x40], "once, and no abort message");
+}
+
+/// A node, and frames of another client at their times.
+struct Scripted {
+    node: Pressure,
+    frames: Vec<(Instant, Frame)>,
+}
+
+impl Station for Scripted {
+    fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.node.receive(frame, now, out);
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        while self.frames.first().is_some_and(|(at, _)| *at <= now) {
+            let (_, frame) = self.frames.remove(0);
+            let _ = out.send(frame);
+            self.node.receive(&frame, now, out);
+        }
+        let next = self.frames.first().map_or(Instant::NEVER, |(at, _)| *at);
+        self.node.poll(now, out).min(next)
+    }
+}
+
+/// Another client that writes an object six seconds after the start.
+fn writes(index: u16, value: u32) -> Wire<Scripted> {
+    let [low, high] = index.to_le_bytes();
+    let [a, b, c, d] = value.to_le_bytes();
+    let write = frame(0x601, [0x23, low, high, 1, a, b, c, d]);
+    Wire::new(Scripted { node: Pressure::new(1), frames: vec![(Instant(6_000_000), write)] })
+}
+
+const KILOPASCAL: u32 = 0x0322_0000;
+
+#[test]
+fn the_monitor_follows_a_unit_that_another_client_writes() {
+    let wire = writes(0x6131, KILOPASCAL);
+    let lines = printed(&wire, &["monitor", "--start", "--count", "24"]);
+    let units: Vec<&str> = lines
+        .lines()
+        .filter(|line| line.contains("Pressure process value"))
+        .filter_map(|line| line.split_whitespace().last())
+        .collect();
+    assert!(units.first() == Some(&"bar") && units.last() == Some(&"kPa"), "{lines}");
+    assert!(units.is_sorted(), "{lines}");
+}
+
+/// A client with `--changes` gets the same number in a new unit, too.
+#[test]
+fn a_new_unit_is_a_change() {
+    let lines = printed(&writes(0x6131, KILOPASCAL), &["monitor", "--start", "--changes", "--count", "3"]);
+    assert!(lines.contains("= 0 bar") && lines.contains("= 0 kPa"), "{lines}");
+}
+
+#[test]
+fn a_column_of_a_recording_has_one_unit() {
+    let wire = writes(0x6131, KILOPASCAL);
+    let rows = printed_to_file(&wire, &["--start", "--for", "12"]);
+    let (head, rows) = rows.split_once('\n').expect("a table");
+    assert!(head.contains("6130h:1 Pressure process value [bar]"), "{head}");
+    let cells: Vec<Vec<&str>> = rows.lines().map(|row| row.split(',').collect()).collect();
+    assert!(cells.len() > 8 && cells[0][1] == "0" && cells.iter().all(|row| row[2] == "0"), "{rows}");
+    assert!(cells.iter().rev().take(3).all(|row| row[1].is_empty()), "{rows}");
+}
+
+fn printed_to_file<S: Station + 'static>(wire: &Wire<S>, flags: &[&str]) -> String {
+    let path = std::env::temp_dir().join(format!("nodectl-units-{}.csv", std::process::id()));
+    let line = [&["record", "--csv", path.to_str().expect("text")][..], flags].concat();
+    printed(wire, &line);
+    let text = std::fs::read_to_string(&path).expect("a table");
+    std::fs::remove_file(path).expect("a file");
+    text
+}
+
+/// A unit that is not saved is lost with a restart of the node.
+#[test]
+fn the_monitor_reads_the_unit_again_after_a_restart() {
+    let nmt = |command| Frame::new(0x000, &[command, 1]).expect("a frame");
+    let frames = vec![(Instant(6_000_000), nmt(0x81)), (Instant(7_500_000), nmt(0x01))];
+    let wire = Wire::new(Scripted { node: Pressure::new(1), frames });
+    printed(&wire, &["write", "6131:1", "kPa"]);
+    let lines = printed(&wire, &["monitor", "--start", "--count", "24"]);
+    assert!(lines.lines().next().is_some_and(|line| line.contains("kPa")), "{lines}");
+    assert!(lines.lines().rev().take(2).any(|line| line.ends_with(" bar")), "{lines}");
 }

@@ -142,7 +142,8 @@ fn an_acquisition_names_its_missing_tpdos_until_a_value_arrives() {
         period: Duration::from_millis(100),
         start: false,
     };
-    let mut acquisition = Acquisition::open(&mut network, setup, &catalogue, &[]).expect("an acquisition");
+    let mut acquisition =
+        Acquisition::open(&mut network, setup, &std::sync::Arc::new(catalogue), &[]).expect("an acquisition");
     let waits = "waiting for TPDO 1 (181h) of node 1";
     assert_eq!(acquisition.awaited().as_deref(), Some(waits));
     let until = acquisition.now() + Duration::from_millis(3000);

@@ -50,7 +50,7 @@ fn keeps(
         s.unlock_counter()?;
     }
     let is_kept = saved_and_restarted(s, (index, sub), bytes, group, restart);
-    s.sheltered(|s| {
+    s.restoring(|s| {
         s.put_back_since(kept)?;
         s.try_write(0x1010, group, b"save")?
             .map_err(|refusal| fail("the former value is saved again", refusal))

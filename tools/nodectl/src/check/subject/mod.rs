@@ -51,6 +51,10 @@ pub struct Subject<'n> {
     is_interrupted: Box<dyn Fn() -> bool + 'n>,
     /// Whether the run cannot be interrupted now, because the device gets its values back.
     is_sheltered: bool,
+    /// Whether the check under way has ended because of an interruption.
+    is_ending: bool,
+    /// The values that a check has not restored in an interrupted run.
+    pub(super) not_restored: Vec<String>,
 }
 
 impl<'n> Subject<'n> {
@@ -64,6 +68,8 @@ impl<'n> Subject<'n> {
             has_company: false,
             is_interrupted: Box::new(|| false),
             is_sheltered: false,
+            is_ending: false,
+            not_restored: Vec::new(),
         }
     }
 
@@ -80,8 +86,26 @@ impl<'n> Subject<'n> {
     }
 
     /// Ends the check if the user has interrupted the run.
-    pub(in crate::check) fn go_on(&self) -> Outcome {
-        if self.is_interrupted() && !self.is_sheltered { Err(Stop::Interrupted) } else { Ok(()) }
+    pub(in crate::check) fn go_on(&mut self) -> Outcome {
+        if !self.is_interrupted() || self.is_sheltered {
+            return Ok(());
+        }
+        if !std::mem::replace(&mut self.is_ending, true) {
+            // A device that waits for the segments of a block does not take a request that restores a value.
+            self.sheltered(|subject| subject.give_up(0, 0))?;
+        }
+        Err(Stop::Interrupted)
+    }
+
+    /// Runs a function that restores values. Its failure in an interrupted run, whose check has no verdict, is kept.
+    pub(in crate::check) fn restoring(&mut self, does: impl FnOnce(&mut Self) -> Outcome) -> Outcome {
+        let done = self.sheltered(does);
+        if let Err(Stop::Failed(deviation)) = &done
+            && self.is_interrupted()
+        {
+            self.not_restored.push(deviation.seen.clone());
+        }
+        done
     }
 
     /// Runs a function that an interruption does not end.

@@ -87,10 +87,9 @@ impl Monitor {
         let node = session.options.node.one()?;
         let catalogue = session.catalogue(node)?;
         let (mut acquisition, output) = self.source.open(session)?;
-        let signals = acquisition.signals().to_vec();
         let (mut start, mut left) = (None, self.count.unwrap_or(usize::MAX));
         let mut hinted: Vec<String> = Vec::new();
-        let mut told: Vec<Option<Value>> = vec![None; signals.len()];
+        let mut told: Vec<Option<(Value, String)>> = vec![None; acquisition.signals().len()];
         while left > 0 {
             let until = acquisition.now() + SILENCE;
             let Some(sample) = acquisition.next(until)? else {
@@ -103,11 +102,13 @@ impl Monitor {
                 continue;
             };
             let start = *start.get_or_insert(sample.at);
-            let before = told[sample.signal].replace(sample.value.clone());
-            if self.changes && before.as_ref() == Some(&sample.value) {
+            let signal = &acquisition.signals()[sample.signal];
+            let now = Some((sample.value.clone(), signal.unit.clone()));
+            let before = std::mem::replace(&mut told[sample.signal], now);
+            if self.changes && before == told[sample.signal] {
                 continue;
             }
-            output.print(&line(node, &catalogue, &signals[sample.signal], &sample, start))?;
+            output.print(&line(node, &catalogue, signal, &sample, start))?;
             left -= 1;
         }
         Ok(())

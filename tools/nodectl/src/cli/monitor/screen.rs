@@ -64,6 +64,7 @@ fn acquire(
     let mut taken = 0;
     while taken < most && acquisition.now() < until {
         if let Some(sample) = acquisition.next(until)? {
+            view.follow(sample.signal, &acquisition.signals()[sample.signal]);
             view.take(&sample);
             taken += 1;
         }

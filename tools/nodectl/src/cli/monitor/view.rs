@@ -59,16 +59,7 @@ pub(super) struct View {
 
 impl View {
     pub(super) fn new(signals: &[Signal], catalogue: Arc<Catalogue>, window: f64) -> View {
-        let track = |signal: &Signal| Track {
-            signal: signal.clone(),
-            newest: "-".to_owned(),
-            meaning: None,
-            count: 0,
-            least: None,
-            greatest: None,
-            points: VecDeque::new(),
-        };
-        let tracks = signals.iter().map(track).collect();
+        let tracks = signals.iter().map(Track::new).collect();
         View { catalogue, tracks, chosen: 0, start: None, now: 0.0, window, is_held: false, has_help: false }
     }
 
@@ -82,6 +73,13 @@ impl View {
         if let Some(track) = self.tracks.get_mut(sample.signal) {
             track.take(sample, self.now, oldest);
             track.meaning = meaning::of(&self.catalogue, track.signal.at, &sample.value);
+        }
+    }
+
+    /// Takes the unit of a signal. Values in a former unit are no longer shown.
+    pub(super) fn follow(&mut self, number: usize, signal: &Signal) {
+        if let Some(track) = self.tracks.get_mut(number).filter(|track| track.signal.unit != signal.unit) {
+            *track = Track::new(signal);
         }
     }
 
@@ -138,6 +136,18 @@ impl View {
 }
 
 impl Track {
+    fn new(signal: &Signal) -> Track {
+        Track {
+            signal: signal.clone(),
+            newest: "-".to_owned(),
+            meaning: None,
+            count: 0,
+            least: None,
+            greatest: None,
+            points: VecDeque::new(),
+        }
+    }
+
     fn take(&mut self, sample: &Sample, now: f64, oldest: f64) {
         self.newest = sample.value.to_string();
         self.count += 1;
@@ -295,6 +305,19 @@ mod tests {
         for label in ["89.0", "94.0", "99.0 s"] {
             assert!(screen.contains(label), "{screen}");
         }
+    }
+
+    #[test]
+    fn a_new_unit_begins_the_values_of_its_signal_again() {
+        let mut view = view();
+        take(&mut view, 5, 1.5);
+        view.follow(0, &Signal::polled(at(0x6130, 1), "Pressure", "bar"));
+        take(&mut view, 6, 2.5);
+        view.follow(0, &Signal::polled(at(0x6130, 1), "Pressure", "kPa"));
+        take(&mut view, 7, 250.0);
+        let screen = screen(&view, 110, 30);
+        let row = screen[2].split_whitespace().collect::<Vec<_>>();
+        assert_eq!(row, ["6130h:1", "Pressure", "250", "kPa", "250", "250", "1"]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod plot;
 mod rows;
 mod table;
 mod target;
+mod units;
 
 use std::io;
 use std::path::PathBuf;
@@ -23,6 +24,7 @@ pub(super) use self::rows::seconds as seconds_between;
 use self::rows::{Rows, Sink};
 use self::table::Table;
 use self::target::{Target, is_standard};
+use self::units::Units;
 use super::source::Source;
 use super::{Failure, Session};
 use crate::acquisition::{Acquisition, Sample, Signal};
@@ -34,7 +36,7 @@ const WAKE: Duration = Duration::from_millis(50);
 /// Records values over time, as CSV, as a stream of Apache Arrow and as a plot.
 ///
 /// Times are those of the bus, where the adapter tells them. The values are kept however the recording ends: by its
-/// duration, Ctrl-C, SIGTERM or the loss of the bus. An existing file is replaced when the new one is complete.
+/// duration, Ctrl-C, SIGTERM or the loss of the bus. Values in another unit than that of their column are left out. An existing file is replaced when the new one is complete.
 #[derive(Debug, Args)]
 pub(super) struct Record {
     #[command(flatten)]
@@ -85,8 +87,11 @@ impl Record {
         let (mut acquisition, _) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
         let mut rows = Rows::new(&signals, sinks(&signals, csv, arrow, svg)?);
-        let mut count = 0_usize;
-        let ended = acquire(&mut acquisition, self.duration, |sample| {
+        let (mut count, mut units) = (0_usize, Units::new(&signals));
+        let ended = acquire(&mut acquisition, self.duration, |signal, sample| {
+            if !units.fit(sample.signal, signal) {
+                return Ok(());
+            }
             count += 1;
             rows.take(sample)
         });
@@ -104,7 +109,8 @@ impl Record {
     fn tell(&self, rows: usize) {
         let is_file = |path: &&PathBuf| !is_standard(path);
         let tables = self.csv.iter().chain(&self.arrow).filter(is_file);
-        let tables = tables.map(|path| format!("{} in {}", counted(rows, "row", "rows"), path.display()));
+        let counted = counted(rows, "row", "rows");
+        let tables = tables.map(|path| format!("{counted} in {}", path.display()));
         let svg = self.svg.iter().filter(is_file).map(|path| format!("a plot in {}", path.display()));
         let written: Vec<String> = tables.chain(svg).collect();
         if !written.is_empty() {
@@ -140,7 +146,7 @@ fn sinks(
 fn acquire(
     acquisition: &mut Acquisition,
     duration: Option<Duration>,
-    mut take: impl FnMut(&Sample) -> Result<(), Failure>,
+    mut take: impl FnMut(&Signal, &Sample) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
@@ -151,7 +157,7 @@ fn acquire(
     while !stop.load(Ordering::Relaxed) && time(acquisition) < end {
         let until = acquisition.now() + WAKE;
         match acquisition.next(until)? {
-            Some(sample) if sample.at < end => take(&sample)?,
+            Some(sample) if sample.at < end => take(&acquisition.signals()[sample.signal], &sample)?,
             _ => (),
         }
     }

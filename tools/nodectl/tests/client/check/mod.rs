@@ -3,6 +3,7 @@
 mod command;
 mod device;
 mod faulty;
+mod interruption;
 mod layers;
 mod own;
 mod reference;
