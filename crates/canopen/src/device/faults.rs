@@ -101,7 +101,7 @@ impl<D: Definition> Inner<D> {
     /// After a reset: reports the faults that are still active, and the groups that could not be loaded.
     pub(super) fn configure_faults(&mut self, now: Tick) {
         // First: a group that has been repaired is no active fault.
-        self.set_stored(now);
+        self.set_stored();
         if Self::has(Services::EMCY) {
             let application = &self.application;
             self.emcy.restart(|number| application.fault_detail(number), now);

@@ -12,7 +12,7 @@ use crate::emcy::Fault;
 use crate::lss::Configuration;
 use crate::nmt::State;
 use crate::sdo::Abort;
-use crate::{Duration, Instant, Tick, Transmit};
+use crate::{Duration, Instant, Transmit};
 
 /// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -294,13 +294,14 @@ impl<D: Definition> Inner<D> {
         self.application.loaded(group, soundness == Soundness::Whole);
     }
 
-    /// Sets the faults of the groups that could not be loaded, and clears those of all others.
-    pub(super) fn set_stored(&mut self, now: Tick) {
-        let groups = if Self::has(Services::OWN_GROUPS) { &Group::ALL[..] } else { &Group::COMMON[..] };
-        for &group in groups {
-            let soundness = self.damage.of(group);
-            self.set_fault(Fault::StoredData(group), soundness == Soundness::Lost, now);
-            self.set_fault(Fault::OlderData(group), soundness == Soundness::Older, now);
+    /// Sets the faults of the groups that could not be loaded, and clears those of all others, without an EMCY.
+    pub(super) fn set_stored(&mut self) {
+        let Damage { lost, older } = self.damage;
+        let changes = self.emcy.set_stored(lost, older);
+        for fault in Fault::of_storage() {
+            if changes.has(fault) {
+                self.application.fault(fault, self.emcy.has(fault), self.image.as_mut());
+            }
         }
     }
 }

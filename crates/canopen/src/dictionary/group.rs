@@ -124,6 +124,11 @@ impl Groups {
         self.0 = if contains { self.0 | bit } else { self.0 & !bit };
     }
 
+    /// The set as bits, in the order of [`Group::ALL`].
+    pub(crate) const fn bits(self) -> u8 {
+        self.0
+    }
+
     /// Whether two sets have a group in common.
     pub(crate) const fn meets(self, other: Groups) -> bool {
         self.0 & other.0 != 0

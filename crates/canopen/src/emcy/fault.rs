@@ -1,6 +1,6 @@
 //! Faults: communication faults, which the device detects itself, and faults of the application.
 
-use crate::dictionary::Group;
+use crate::dictionary::{Group, Groups};
 
 /// A fault that the device signals by EMCY.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +124,11 @@ impl Fault {
         })
     }
 
+    /// The faults of the storage groups.
+    pub(crate) fn of_storage() -> impl Iterator<Item = Fault> {
+        (7..Fault::SINGLES).filter_map(Fault::single)
+    }
+
     /// The bit of a fault that can be active only once; `None` for a fault with a number.
     const fn bit(self) -> Option<u8> {
         match self {
@@ -212,6 +217,14 @@ impl FaultSet {
         let before = *set;
         *set = if is_active { before | bit } else { before & !bit };
         *set != before
+    }
+
+    /// Replaces the faults of the storage groups. Returns the changes.
+    pub(crate) fn set_stored(&mut self, lost: Groups, older: Groups) -> FaultSet {
+        let before = self.single;
+        let groups = u32::from(lost.bits()) | u32::from(older.bits()) << 8;
+        self.single = before & Fault::OF_COMMUNICATION | groups << 7;
+        FaultSet { single: before ^ self.single, ..FaultSet::EMPTY }
     }
 
     /// Removes the faults of heartbeats and RPDOs.

@@ -2,6 +2,7 @@
 
 use super::history::History;
 use super::{Condition, ErrorClass, Fault, FaultSet, Message};
+use crate::dictionary::Groups;
 use crate::transmit::{Context, RETRY};
 use crate::{CanId, CobId, Frame, Span, Tick, Transmit};
 
@@ -140,6 +141,11 @@ impl Producer {
             self.report(0, [0; 5], now);
         }
         is_change
+    }
+
+    /// Sets the faults of the storage groups, of which [`Producer::restart`] sends the EMCYs. Returns the changes.
+    pub(crate) fn set_stored(&mut self, lost: Groups, older: Groups) -> FaultSet {
+        self.active.set_stored(lost, older)
     }
 
     /// As [`Producer::set`], for a device without EMCY: no message waits.
