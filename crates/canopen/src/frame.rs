@@ -28,6 +28,7 @@ impl Frame {
 
     /// A data frame of the first `len` bytes, at most eight.
     #[inline(always)]
+    #[allow(clippy::inline_always)] // Every caller knows the length or the CAN-ID, so less code than a call.
     pub(crate) fn data_frame(id: CanId, len: u8, data: [u8; 8]) -> Frame {
         Frame { head: head(id.get(), len), data }
     }

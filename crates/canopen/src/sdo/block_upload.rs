@@ -165,12 +165,10 @@ impl Sender {
 
 /// The next seven bytes, zeros after the last one, and the rest of the content.
 fn next_segment(content: &[u8]) -> ([u8; 7], &[u8]) {
-    match content.split_first_chunk() {
-        Some((data, rest)) => (*data, rest),
-        None => {
-            let mut data = [0; 7];
-            copy(&mut data, content);
-            (data, &[])
-        }
+    if let Some((data, rest)) = content.split_first_chunk() {
+        return (*data, rest);
     }
+    let mut data = [0; 7];
+    copy(&mut data, content);
+    (data, &[])
 }

@@ -26,6 +26,7 @@ impl Multiplexer {
     }
 
     /// From the first word of a frame: a response takes the same three bytes back.
+    #[allow(clippy::cast_possible_truncation)] // The two parts of the word.
     const fn of_head(head: u32) -> Multiplexer {
         Multiplexer { index: (head >> 8) as u16, sub: (head >> 24) as u8 }
     }
