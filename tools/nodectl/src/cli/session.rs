@@ -298,7 +298,8 @@ impl Session {
             (0x0800_0022, 0x6125 | 0x6925 | 0x6139 | 0x6939) => {
                 let status = 0x6150 | (error.at.index & 0x0800);
                 Some(format!(
-                    "the process value is not valid: see the status, {status:04X}h:{}",
+                    "the process value is not valid (see the status, {status:04X}h:{}), or a parameter of its samples has \
+                     changed within 3 ms: repeat",
                     error.at.sub
                 ))
             }
