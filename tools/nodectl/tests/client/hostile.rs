@@ -362,7 +362,9 @@ fn every_command_survives_every_manner() {
                 result.map_err(|error| error.to_string())
             );
             assert!(seconds <= limit, "{context}");
-            assert!(printed.len() < 100_000, "{context}");
+            // A trace prints a line for each frame, here 2,000 a second.
+            let most = if line.contains(&"trace") { 500_000 } else { 100_000 };
+            assert!(printed.len() < most, "{context}, {} bytes", printed.len());
             assert!(printed.chars().all(|char| char == '\n' || !char.is_control()), "{context}: {printed:?}");
         }
     }
