@@ -37,8 +37,8 @@ const SHORTEST_SENT: f64 = 55.0;
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
 /// RPDOs in a millisecond, with room between them for other frames.
 const RPDOS: usize = 6;
-/// Duration of the busy run.
-const SPAN: u64 = 3000;
+/// Duration of each part of the busy run, in ms.
+const PART: u64 = 1500;
 
 /// The known properties of a task.
 struct Task {
@@ -238,7 +238,7 @@ fn busy_node(estimate: Estimate) -> (World, Master) {
     (world, master)
 }
 
-/// The highest load that the bus can carry, for so many milliseconds: every TPDO with every SYNC, RPDOs, SDO transfers, and
+/// The highest load that the bus can carry: every TPDO with every SYNC, RPDOs, SDO transfers, and
 /// foreign frames.
 fn load(world: &mut World, master: &Master, milliseconds: u64) {
     for millisecond in 0..milliseconds {
@@ -255,7 +255,7 @@ fn load(world: &mut World, master: &Master, milliseconds: u64) {
     }
 }
 
-/// RPDOs one behind the other, for so many milliseconds.
+/// RPDOs alone.
 fn rpdos(world: &mut World, master: &Master, milliseconds: u64) {
     for millisecond in 0..milliseconds {
         for _ in 0..RPDOS {
@@ -268,12 +268,12 @@ fn rpdos(world: &mut World, master: &Master, milliseconds: u64) {
 /// A bus full of RPDOs, and then the other load without and with a save. `after` sees the node after each of the three.
 pub(crate) fn busy_run(estimate: Estimate, mut after: impl FnMut(&mut World)) -> World {
     let (mut world, master) = busy_node(estimate);
-    rpdos(&mut world, &master, SPAN / 2);
+    rpdos(&mut world, &master, PART);
     after(&mut world);
-    load(&mut world, &master, SPAN / 2);
+    load(&mut world, &master, PART);
     after(&mut world);
     master.send(&mut world, 0x601, &SAVE);
-    load(&mut world, &master, SPAN / 2);
+    load(&mut world, &master, PART);
     after(&mut world);
     world
 }

@@ -90,7 +90,7 @@ const AFTER_BOOT: Duration = Duration::from_millis(500);
 /// The time between two tries to read the units.
 const AGAIN: Duration = Duration::from_millis(1000);
 
-/// What frames have told, in their order.
+/// The content of the frames, in their order.
 enum News {
     /// The bytes of a signal.
     Value { at: Instant, signal: usize, bytes: Vec<u8> },
@@ -259,7 +259,7 @@ impl<'n> Acquisition<'n> {
         }
     }
 
-    /// The next sample of the frames that were taken, in the unit that was told before it.
+    /// The next sample of the frames that were taken, in the unit that was valid before it.
     fn ready(&mut self) -> Option<Sample> {
         loop {
             match self.news.pop_front()? {

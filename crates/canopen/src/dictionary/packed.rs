@@ -81,7 +81,7 @@ pub fn is_packed(mut packed: &[u8], index: u16, sub: u8) -> bool {
 
 impl Dictionary {
     /// Writes the values of a group to the beginning of `out`. Returns the number of bytes. A COB-ID with the
-    /// pre-defined CAN-ID of this node-ID follows the node-ID with which it is loaded. In the place of a value beyond its
+    /// pre-defined CAN-ID of this node-ID follows the node-ID with which it is loaded. Instead of a value beyond its
     /// limits, which only the application itself can set, the default is stored: the value would make the set useless.
     ///
     /// # Errors
@@ -166,7 +166,7 @@ impl Dictionary {
         Ok(())
     }
 
-    /// What is stored in the place of a value; `None` for the value itself.
+    /// The value to store instead of a value; `None` for the value itself.
     fn number_to_store(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> Option<[u8; 4]> {
         let number = match self.relative(entry, node_id, image) {
             Some(number) => number,

@@ -65,7 +65,7 @@ impl Condition {
         Condition { code, register: 0, detail: [0; 5], class: None }
     }
 
-    /// A group whose newest stored values could not be loaded. `in_use` tells the values that are.
+    /// A group whose newest stored values could not be loaded. `in_use`: the values in use instead.
     const fn of_storage(group: Group, in_use: u8) -> Condition {
         let code = 0x6300 | group.sub() as u16;
         Condition { code, register: 0, detail: [in_use, 0, 0, 0, 0], class: Some(ErrorClass::DEVICE) }

@@ -192,7 +192,7 @@ pub(super) struct Sink {
 }
 
 impl Sink {
-    /// The destination for a download of so many bytes, if the client announces them.
+    /// The destination for a download. `size`: the number of bytes, if the client announces it.
     pub(super) fn new(at: Multiplexer, size: Option<u32>, room: Room) -> Sink {
         let Room { is_stream, limit } = room;
         Sink { at, is_stream, is_announced: size.is_some(), limit, gone: 0, crc: 0, held: 0, direct: 0 }

@@ -151,7 +151,7 @@ fn the_process_half_leaves_waiting_frames_to_the_services() {
 }
 
 #[test]
-fn the_application_writes_what_a_pdo_could_write() {
+fn the_application_writes_the_objects_of_pdos() {
     let mut bench = Bench::operational();
     let mut write = |index, sub, bytes: &[u8]| {
         let before = *bench.device.image();

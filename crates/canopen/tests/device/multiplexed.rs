@@ -355,7 +355,7 @@ fn a_write_to_the_scanner_list_leaves_other_pdos_alone() {
 }
 
 #[test]
-fn the_number_of_the_scanner_list_applies_when_it_is_written() {
+fn a_new_number_of_the_scanner_list_applies_at_once() {
     let mut bench = sender(SOURCE);
     bench.nmt(1);
     bench.write32(0x1FA0, 1, 0x0260_0002).unwrap();

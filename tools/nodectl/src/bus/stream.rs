@@ -15,7 +15,7 @@ const CONNECT: Duration = Duration::from_secs(3);
 /// The shortest time-out of a read; 0 would mean no time-out.
 const SHORTEST: Duration = Duration::from_millis(1);
 
-/// What the C library says of a file that is no serial port.
+/// The error of the C library for a file that is no serial port.
 const NO_TERMINAL: &str = "Not a typewriter";
 
 /// A source of bytes that can be read with a time-out.

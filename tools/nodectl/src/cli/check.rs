@@ -207,7 +207,7 @@ fn interruption(at_once: String) -> Arc<AtomicBool> {
     is_interrupted
 }
 
-/// What a run may leave changed that ends before the device has its values back.
+/// The values that may stay changed when a run ends before it has restored them.
 fn at_once(node: NodeId, allowed: Effect) -> String {
     let saved = match allowed {
         Effect::Stores => "; its saved parameters may be the defaults or those of a check",

@@ -145,7 +145,7 @@ fn every_bad_input_has_an_error_text() {
 
 /// A message names the words, objects or files that are right.
 #[test]
-fn a_message_names_what_is_right() {
+fn a_message_names_the_right_values() {
     let short = format!("{}/short.img", env!("CARGO_TARGET_TMPDIR"));
     std::fs::write(&short, "12 bytes ...").expect("a file");
     for (line, words) in [

@@ -185,7 +185,7 @@ impl<O: Objects> Server<O> {
             self.transfer = Transfer::Download(Download::new(sink));
             return Ok(());
         }
-        // Expedited, without a size: the data type tells it.
+        // Expedited, without a size: it is that of the data type.
         let size = match objects.writable(at)? {
             Writable::Value(size) => size,
             Writable::Stream => data.len(),

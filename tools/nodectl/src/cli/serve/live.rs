@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn a_signal_is_read_for_a_page_that_wants_it_while_its_tpdo_does_not_come() {
+    fn a_signal_whose_tpdo_does_not_come_is_read_by_sdo() {
         let (mut live, key) = (Live::default(), Key::new(node(), at(0x2000, 1)));
         live.learn(node(), survey(&[(0x2000, 1, 8)]));
         live.want(BTreeSet::from([key]), BTreeSet::from([key]));

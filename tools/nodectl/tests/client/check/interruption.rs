@@ -96,7 +96,7 @@ fn restores(only: &[&str], step: usize) {
 }
 
 #[test]
-fn an_interrupted_run_restores_what_was_saved() {
+fn an_interrupted_run_restores_the_saved_values() {
     restores(&["STO"], 211);
     restores(&["STO-20", "STO-40"], 23);
 }

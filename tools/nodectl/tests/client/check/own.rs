@@ -73,7 +73,7 @@ fn a_configured_node_conforms_and_keeps_what_it_has_saved() {
 
 /// An interruption at any time: while a check listens, while it has changed PDOs, and while it has restored the defaults.
 #[test]
-fn an_interrupted_run_leaves_what_the_node_had() {
+fn an_interrupted_run_restores_the_values_of_the_node() {
     for (device, step) in eds::DEVICES.iter().zip([1_700, 1_900, 2_300, 2_900]) {
         let wire = Wire::new(Pressure::of(device.personality, 5));
         if device.personality == Personality::Lift {

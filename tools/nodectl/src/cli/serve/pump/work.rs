@@ -164,7 +164,7 @@ impl Pump {
         }
     }
 
-    /// Tells the pages that the signals of a node are others, or have other units.
+    /// Sends the pages the new signals or units of a node.
     pub(super) fn tell_mapping(&self, node: NodeId) {
         self.pages.tell(&self.setup.hub, &json!({ "event": "mapping", "node": node.get() }));
     }
