@@ -56,7 +56,7 @@ impl Slot {
             recessive: course.recessive,
             end: course.end,
         };
-        slot.agenda = slot.agenda(&taps, &course);
+        slot.agenda = slot.agenda(contenders, &taps, &course);
         Some(slot)
     }
 
@@ -117,24 +117,30 @@ impl Slot {
             .all(|n| participants.get_mut(*n).is_none_or(|sender| sender.attachment(at) == Attachment::Off))
     }
 
-    fn agenda(&self, taps: &[Tap], course: &Course) -> VecDeque<(Time, Item)> {
+    fn agenda(&self, contenders: &[Contender], taps: &[Tap], course: &Course) -> VecDeque<(Time, Item)> {
         let notices = course.happenings.iter().map(|happening| {
             let to = taps[happening.tap].members.clone();
             (happening.at, Item::Notice { to, notice: happening.notice })
         });
-        let events = self.frame_event(course).into_iter().chain(self.failure(taps, course));
+        let events = self.frame_event(contenders, taps, course).into_iter().chain(self.failure(taps, course));
         let mut agenda: Vec<_> = notices.chain(events.map(|(at, event)| (at, Item::Log(event)))).collect();
         agenda.sort_by_key(|(at, _)| *at);
         agenda.into()
     }
 
-    /// The event of a frame that was sent, or that at least one participant has received.
-    fn frame_event(&self, course: &Course) -> Option<(Time, Event)> {
-        let find =
-            |test: fn(&Notice) -> bool| course.happenings.iter().find(|h| test(&h.notice)).map(|h| h.at);
-        let sent = find(|notice| matches!(notice, Notice::Sent));
-        let end = sent.or_else(|| find(|notice| matches!(notice, Notice::Received(_))))?;
-        let Contender { frame, participant: transmitter, .. } = self.winner;
+    /// The event of a frame that was sent, or that at least one participant has received. Of several frames with the same
+    /// identifier, it is the one that was sent: the others have met a bit error.
+    fn frame_event(&self, contenders: &[Contender], taps: &[Tap], course: &Course) -> Option<(Time, Event)> {
+        let of =
+            |at: &Happening| contenders.iter().find(|own| taps[at.tap].members.contains(&own.participant));
+        let sent = course.happenings.iter().find(|happening| matches!(happening.notice, Notice::Sent));
+        let received = course.happenings.iter().find_map(|happening| match happening.notice {
+            Notice::Received(frame) => Some((happening.at, frame)),
+            _ => None,
+        });
+        let Contender { frame, participant: transmitter, .. } = *sent.and_then(of).unwrap_or(&self.winner);
+        let end = sent.map(|happening| happening.at).or(received.map(|(at, _)| at))?;
+        let frame = received.map_or(frame, |(_, frame)| frame);
         Some((end, Event::Frame { start: self.start, end, frame, transmitter }))
     }
 

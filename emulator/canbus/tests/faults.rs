@@ -176,20 +176,30 @@ fn a_bus_that_destroys_every_frame_continues() {
     assert_eq!(heard.len(), 200);
 }
 
+/// In either order of the participants.
 #[test]
 fn an_identifier_used_twice_is_a_bit_error() {
-    let mut nodes = [node(), node(), node()];
-    nodes[0].send(standard(0x181, &[0x0F]), Time::ZERO);
-    nodes[1].send(standard(0x181, &[0xF0]), Time::ZERO);
-    let mut bus = Bus::new();
-    let events = run(&mut bus, &mut nodes, BIT * 100);
-    let error = |event: &Event| matches!(event, Event::Error { error: BusError::BitRecessive, .. });
-    assert!(events.iter().all(error));
-    assert!(nodes[..2].iter().all(|node| counters(node).0 > 0));
-    assert!(frames(&mut nodes[2]).is_empty());
-    // Both retransmit at the same instant until both are error passive: from then on the dominant bit wins.
-    run(&mut bus, &mut nodes, Time::from_millis(4));
-    assert_eq!(frames(&mut nodes[2]), [standard(0x181, &[0x0F]), standard(0x181, &[0xF0])]);
+    let all = [standard(0x181, &[0x0F]), standard(0x181, &[0xF0])];
+    for [first, second] in [all, [all[1], all[0]]] {
+        let mut nodes = [node(), node(), node()];
+        nodes[0].send(first, Time::ZERO);
+        nodes[1].send(second, Time::ZERO);
+        let mut bus = Bus::new();
+        let events = run(&mut bus, &mut nodes, BIT * 100);
+        let error = |event: &Event| matches!(event, Event::Error { error: BusError::BitRecessive, .. });
+        assert!(events.iter().all(error));
+        assert!(nodes[..2].iter().all(|node| counters(node).0 > 0));
+        assert!(frames(&mut nodes[2]).is_empty());
+        // Both retransmit at the same instant until both are error passive: from then on the dominant bit wins.
+        let events = run(&mut bus, &mut nodes, Time::from_millis(4));
+        assert_eq!(frames(&mut nodes[2]), all);
+        let logged = events.iter().filter_map(|event| match event {
+            Event::Frame { frame, transmitter, .. } => Some((*frame, *transmitter)),
+            _ => None,
+        });
+        let place = |frame| usize::from(frame != first);
+        assert!(logged.eq(all.map(|frame| (frame, place(frame)))), "the log has the frames that were sent");
+    }
 }
 
 #[test]
