@@ -195,7 +195,7 @@ fn an_identifier_used_twice_is_a_bit_error() {
         assert_eq!(frames(&mut nodes[2]), all);
         let logged = events.iter().filter_map(|event| match event {
             Event::Frame { frame, transmitter, .. } => Some((*frame, *transmitter)),
-            _ => None,
+            Event::Error { .. } => None,
         });
         let place = |frame| usize::from(frame != first);
         assert!(logged.eq(all.map(|frame| (frame, place(frame)))), "the log has the frames that were sent");
