@@ -183,8 +183,8 @@ pub(super) const MENDS: &[Mend] = &[
         scenario: "states::an_error_that_is_found_at_a_start_acts_as_1029h_demands",
         edits: &[Edit {
             file: "crates/canopen/src/emcy/fault.rs",
-            mended: "Fault::StoredData(_) | Fault::OlderData(_) => Some(ErrorClass::DEVICE),",
-            fault: "Fault::StoredData(_) | Fault::OlderData(_) => None,",
+            mended: "detail: [in_use, 0, 0, 0, 0], class: Some(ErrorClass::DEVICE) }",
+            fault: "detail: [in_use, 0, 0, 0, 0], class: None }",
         }],
     },
     Mend {
@@ -194,8 +194,8 @@ pub(super) const MENDS: &[Mend] = &[
         edits: &[
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
-                mended: "            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
-                fault: "            { let [low, high] = fault.condition(self.conditions).code.to_le_bytes(); self.history.push([low, high, 0, 0]); }\n            self.errors |= self.repeat(fault, detail, now);\n        }\n        is_new",
+                mended: "            self.errors |= self.repeat(fault, detail, now);\n        } else if is_change",
+                fault: "            { let [low, high] = fault.condition(self.conditions).code.to_le_bytes(); self.history.push([low, high, 0, 0]); }\n            self.errors |= self.repeat(fault, detail, now);\n        } else if is_change",
             },
             Edit {
                 file: "crates/canopen/src/emcy/producer.rs",
@@ -211,8 +211,8 @@ pub(super) const MENDS: &[Mend] = &[
         edits: &[
             Edit {
                 file: "crates/canopen/src/dictionary/packed.rs",
-                mended: "Some(relative) => writer.append(&relative.to_le_bytes())?,",
-                fault: "Some(_) => writer.append(entry.field.get(image))?,",
+                mended: "Some(number) => number,",
+                fault: "Some(_) => return None,",
             },
             Edit {
                 file: "crates/canopen/src/dictionary/packed.rs",
