@@ -267,9 +267,9 @@ impl Track {
         self.signal.tpdo.is_none()
     }
 
-    /// Sets the signal. Waiting samples in another unit are dropped.
+    /// Sets the signal. Waiting samples in another unit are dropped, but not those from before the unit was known.
     fn change(&mut self, signal: Signal) {
-        if self.signal.unit != signal.unit {
+        if !self.signal.unit.is_empty() && self.signal.unit != signal.unit {
             self.samples.clear();
         }
         self.signal = signal;
