@@ -426,9 +426,11 @@ mod tests {
             assert_eq!(unit(&live).as_deref(), Some(""), "no unit until the node has told it");
             let asked: BTreeSet<_> = numbers.iter().map(|(index, ..)| (*index, 1)).collect();
             assert_eq!(live.unasked(node()), asked);
+            live.on_reading(key, 0.5, &250_u32.to_le_bytes());
             for (index, number, _) in numbers {
                 live.answer(node(), at(index, 1), Some(&u32::to_le_bytes(number)));
             }
+            assert!(!live.take().0.is_empty(), "a sample from before the unit is known is kept");
             assert_eq!((unit(&live).as_deref(), sample(&mut live)), (Some(former.0), Some(former.1)));
             assert!(live.unasked(node()).is_empty());
             live.on_reading(key, 1.0, &250_u32.to_le_bytes());
