@@ -98,3 +98,13 @@ def driver():
     driver = browser()
     yield driver
     driver.quit()
+
+
+@pytest.fixture(scope="module")
+def server(simulator):
+    """The server of the page, on the simulator of the file."""
+    from page import Server
+
+    server = Server(simulator)
+    yield server
+    server.stop()

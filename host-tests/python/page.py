@@ -97,6 +97,11 @@ class Page:
         self.script("location.hash = arguments[0]", name)
         self.until(lambda: self.script("return !document.getElementById(arguments[0]).hidden", f"view-{name}"), f"show {name}")
 
+    def knows(self, *nodes: int) -> None:
+        """Waits until the page has identified these nodes."""
+        for node in nodes:
+            self.says(f"tr[data-node='{node}']", "STM32F4")
+
     def find(self, selector: str):
         return self.driver.find_element(By.CSS_SELECTOR, f"{SHOWN} {selector}")
 

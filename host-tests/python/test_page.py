@@ -34,13 +34,6 @@ def simulator():
     simulator.end()
 
 
-@pytest.fixture(scope="module")
-def server(simulator: Simulator):
-    server = Server(simulator)
-    yield server
-    server.stop()
-
-
 @pytest.fixture
 def page(driver, server: Server):
     """The page as opened by a user, with both nodes known and Operational."""
@@ -53,8 +46,7 @@ def page(driver, server: Server):
 
 def start(page: Page) -> None:
     page.view("overview")
-    for node in (PRESSURE, ENCODER):
-        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.knows(PRESSURE, ENCODER)
     page.press("Start all")
     for node in (PRESSURE, ENCODER):
         page.says(f"tr[data-node='{node}'] td[data-label=State]", "operational")

@@ -32,8 +32,7 @@ def simulator():
 def page(driver, simulator: Simulator):
     server = Server(simulator)
     page = Page(driver, server.url)
-    for node in (PRESSURE, ENCODER, LIFT):
-        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.knows(PRESSURE, ENCODER, LIFT)
     page.press("Start all")
     for node in (PRESSURE, ENCODER, LIFT):
         page.says(f"tr[data-node='{node}'] td[data-label=State]", "operational")
@@ -159,7 +158,7 @@ def test_a_node_without_a_node_id_is_found_and_gets_one(page: Page):
     page.press("Give the node-ID")
     page.says(PANEL + "[aria-labelledby=lss-title]", f"node {NEW} is there")
     page.view("overview")
-    page.says(f"tr[data-node='{NEW}']", "STM32F4")
+    page.knows(NEW)
 
 
 def test_what_is_plotted_is_saved_as_a_table_and_as_a_drawing(page: Page, driver, tmp_path: Path):
@@ -187,8 +186,7 @@ def test_the_bit_rate_of_all_nodes_is_changed(driver):
     simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
     server = Server(simulator)
     page = Page(driver, server.url)
-    for node in (1, 2):
-        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.knows(1, 2)
     page.view("commissioning")
     page.choose("Bit rate of all nodes", "250")
     page.press("Change the bit rate")
@@ -239,8 +237,7 @@ def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str, nodes:
     relay = Relay(simulator)
     server = Server(simulator, bus=relay)
     page = Page(driver, server.url)
-    for node in nodes:
-        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.knows(*nodes)
     ask = """const ask = (node) => window.canopen.bus.request("read", { node, objects: [[0x1000, 0]] });
         setInterval(() => %s.forEach((node) => ask(node).catch(() => null)), 50);""" % list(nodes)
     if master == "page":

@@ -26,19 +26,11 @@ def simulator():
     simulator.end()
 
 
-@pytest.fixture(scope="module")
-def server(simulator: Simulator):
-    server = Server(simulator)
-    yield server
-    server.stop()
-
-
 @pytest.fixture
 def page(driver, server: Server):
     size(driver, 1440, 900)
     page = Page(driver, server.url)
-    for node in NODES:
-        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.knows(*NODES)
     yield page
     page.leave()
 

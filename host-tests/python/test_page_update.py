@@ -70,8 +70,7 @@ def two(driver):
     simulator = Simulator("--bitrate", "1000", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
     server = Server(simulator)
     page = Page(driver, server.url)
-    for node in (1, 2):
-        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.knows(1, 2)
     yield page, server, simulator
     page.leave()
     server.stop()

@@ -19,7 +19,7 @@ impl From<Bits> for Raw {
 
 impl Empty {
     fn echo(&mut self, frame: &Raw) {
-        // Of any length: the copy takes `memcpy`, which every program has for its domain and its node.
+        // The length is not constant, so the compiler calls `memcpy`, as every program does for its domain and its node.
         self.0.write(0, frame.0.data.get(..frame.0.len).unwrap_or(&[]));
         transmit(frame, |frame| frame.0);
     }

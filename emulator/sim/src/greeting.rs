@@ -29,7 +29,7 @@ pub(crate) struct Greeting<'a> {
     pub(crate) socketcand: SocketAddr,
     pub(crate) slcan: Option<SocketAddr>,
     pub(crate) control: Option<SocketAddr>,
-    /// The address of the page, or the reason why there is none; `None` when no page was requested.
+    /// The address of the page, or the reason for its absence; `None` when no page was requested.
     pub(crate) page: Option<Result<&'a str, &'a str>>,
     pub(crate) boards: &'a [Board],
 }

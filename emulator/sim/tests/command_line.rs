@@ -68,7 +68,7 @@ fn images() -> Option<[String; 2]> {
     paths.iter().all(|path| std::path::Path::new(path).exists()).then_some(paths)
 }
 
-/// A simulator of a second with these flags and this standard output.
+/// A simulator of two seconds with these flags and this standard output.
 fn run(flags: &[&str], stdout: Stdio) -> Option<std::process::Child> {
     let [bootloader, firmware] = images()?;
     let always =
@@ -78,15 +78,19 @@ fn run(flags: &[&str], stdout: Stdio) -> Option<std::process::Child> {
     Some(command.stdin(Stdio::null()).stdout(stdout).stderr(Stdio::piped()).spawn().unwrap())
 }
 
+/// The exit code and the standard error of a simulator with these flags and this standard output.
+fn ended(flags: &[&str], stdout: Stdio) -> Option<(Option<i32>, String)> {
+    let output = run(flags, stdout)?.wait_with_output().unwrap();
+    Some((output.status.code(), String::from_utf8(output.stderr).unwrap()))
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_output_is_an_error_and_no_panic() {
     for flags in [&["--json"][..], &[]] {
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let Some(child) = run(flags, full.into()) else { return };
-        let output = child.wait_with_output().unwrap();
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{flags:?}: {stderr}");
+        let Some((code, stderr)) = ended(flags, full.into()) else { return };
+        assert_eq!(code, Some(2), "{flags:?}: {stderr}");
         assert!(!stderr.contains("panicked"), "{flags:?}: {stderr}");
     }
 }
@@ -96,10 +100,8 @@ fn a_closed_standard_output_ends_the_run_without_a_word() {
     for flags in [&["--json"][..], &["--node", "201:pressure@auto"], &[]] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let Some(child) = run(flags, writer.into()) else { return };
-        let output = child.wait_with_output().unwrap();
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(0), "{flags:?}: {stderr}");
+        let Some((code, stderr)) = ended(flags, writer.into()) else { return };
+        assert_eq!(code, Some(0), "{flags:?}: {stderr}");
         assert!(!stderr.contains("rror"), "{flags:?}: {stderr}");
     }
 }

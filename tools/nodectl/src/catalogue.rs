@@ -129,7 +129,7 @@ impl Catalogue {
     pub fn word(&self, at: Multiplexer, text: &str) -> Option<Value> {
         const SIGNATURES: [&str; 6] = ["save", "load", "zero", "tare", "cali", "fact"];
         let entry = self.entry(at).filter(|entry| entry.data_type == DataType(0x07))?;
-        if entry.name.to_lowercase().contains("physical unit") {
+        if takes_unit(entry) {
             return unit::code(text).map(|code| Value::Integer(code.into()));
         }
         let letters: [u8; 4] = SIGNATURES.contains(&text).then(|| text.as_bytes().try_into().ok())??;
@@ -141,8 +141,7 @@ impl Catalogue {
     pub fn words(&self, at: Multiplexer) -> String {
         const SIGNED: [(u16, &str); 4] =
             [(0x1010, "save"), (0x1011, "load"), (0x6125, "zero"), (0x6139, "tare")];
-        let of_unit = self.entry(at).is_some_and(|entry| entry.name.to_lowercase().contains("physical unit"));
-        if of_unit {
+        if self.entry(at).is_some_and(takes_unit) {
             return ", or a unit, such as kPa, mbar or psi".to_owned();
         }
         // In a module of two devices, the second one is 800h higher.
@@ -221,6 +220,11 @@ impl Catalogue {
     pub fn unit(&self, at: Multiplexer) -> &str {
         self.entry(at).map_or("", |entry| &entry.unit)
     }
+}
+
+/// Whether the value of an entry is the code of a unit (CiA 303-2).
+fn takes_unit(entry: &Entry) -> bool {
+    entry.name.to_lowercase().contains("physical unit")
 }
 
 fn built_in(vendor: u32, product: u32) -> Option<&'static Device> {

@@ -34,7 +34,7 @@ const MAX_ATTRIBUTES: usize = 256;
 #[allow(clippy::cast_possible_truncation)] // `check` has verified the ranges, and the tables limit all numbers.
 #[allow(clippy::large_stack_arrays)] // Evaluated during compilation only.
 impl TableBuilder {
-    /// As [`checked`](TableBuilder::checked), for tables that conform to CiA 301.
+    /// Checked tables ([`checked`](TableBuilder::checked)) that also conform to CiA 301.
     ///
     /// # Panics
     /// During compilation, when a table is wrong: see [`check`] and [`check_301`].

@@ -148,7 +148,7 @@ impl Producer {
         self.active.set_stored(lost, older)
     }
 
-    /// As [`Producer::set`], for a device without EMCY: no message waits.
+    /// Sets or clears a fault of a device without EMCY: no message waits. Returns whether this is a change.
     pub(crate) fn set_silently(&mut self, fault: Fault, active: bool) -> bool {
         let is_change = self.active.set(fault, active);
         if is_change && active {

@@ -17,7 +17,8 @@ impl Multiplexer {
         Multiplexer::of_head(u32::from_le_bytes([frame[0], frame[1], frame[2], frame[3]]))
     }
 
-    /// As `parse`, loaded as one word: fewer instructions, but more code where several requests are distinguished.
+    /// The same as [`parse`](Multiplexer::parse), with one load of a word: fewer instructions, but more code where several
+    /// requests are distinguished.
     pub(super) const fn parse_word(frame: &[u8; 8]) -> Multiplexer {
         match frame.first_chunk() {
             Some(head) => Multiplexer::of_head(u32::from_le_bytes(*head)),

@@ -299,7 +299,7 @@ fn the_application_leaves_out_missing_objects() {
 
 /// A receiver may have lost the value meanwhile.
 #[test]
-fn an_object_that_is_selected_again_is_sent_with_the_value_it_had() {
+fn an_object_that_is_selected_again_is_sent_with_its_former_value() {
     let mut bench = sender(DESTINATION);
     bench.nmt(1);
     assert_eq!(mpdos(&mut bench).len(), 3, "entering Operational");

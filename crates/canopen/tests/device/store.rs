@@ -301,7 +301,7 @@ fn the_size_of_a_packed_group_is_known() {
 }
 
 #[test]
-fn a_packed_group_says_which_entries_it_has() {
+fn the_entries_of_a_packed_group_are_known() {
     let packed = packed(&Bench::booted(), Group::Communication);
     for (sub, is_there) in [(0, false), (1, true), (4, true), (5, false)] {
         assert_eq!(is_packed(&packed, 0x1016, sub), is_there, "{sub}");

@@ -41,7 +41,7 @@ fn own_personalities_conform() {
 
 /// A device that a user has configured and saved: SYNC with counter and period, another CAN-ID of EMCY and of SYNC.
 #[test]
-fn a_configured_node_conforms_and_keeps_what_it_has_saved() {
+fn a_configured_node_conforms_and_keeps_its_saved_values() {
     let sheet =
         || eds::DEVICES.iter().find(|device| device.personality == Personality::Pressure).unwrap().eds();
     for settings in [
