@@ -4,9 +4,14 @@ use std::cell::RefCell;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Child, Command, ExitCode, ExitStatus, Stdio};
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use wait_timeout::ChildExt as _;
+
+/// The time that an interrupted program has to say where it stood.
+const LAST_WORDS: Duration = Duration::from_secs(30);
 
 thread_local! {
     /// The file that the programs of this thread print to; without one, they print to the terminal.
@@ -55,13 +60,45 @@ pub(crate) fn say(line: &str) {
 /// Runs a program to its end. The error names the program when it cannot start or fails.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let name = line(command);
+    succeeded(&name, start(command)?.wait()?)
+}
+
+/// Runs a program as [`run`] does, but no longer than a limit. A program that still runs then is interrupted, so that
+/// pytest prints where it stood, and is killed if it goes on.
+pub(crate) fn run_within(limit: Duration, command: &mut Command) -> Result<()> {
+    let name = line(command);
+    let mut child = start(command)?;
+    if let Some(status) = child.wait_timeout(limit)? {
+        return succeeded(&name, status);
+    }
+    interrupt(&mut child)?;
+    if child.wait_timeout(LAST_WORDS)?.is_none() {
+        child.kill()?;
+        child.wait()?;
+    }
+    bail!("`{name}` had not ended after {} s", limit.as_secs());
+}
+
+fn start(command: &mut Command) -> Result<Child> {
     if let Some((out, err)) = streams()? {
         command.stdin(Stdio::null()).stdout(out).stderr(err);
     }
-    let status = command.status().with_context(|| format!("cannot start `{name}`"))?;
+    command.spawn().with_context(|| format!("cannot start `{}`", line(command)))
+}
+
+fn succeeded(name: &str, status: ExitStatus) -> Result<()> {
     if !status.success() {
         bail!("`{name}` failed ({status})");
     }
+    Ok(())
+}
+
+/// Ends a program as Ctrl-C does. Elsewhere than on Linux it is killed.
+fn interrupt(child: &mut Child) -> Result<()> {
+    #[cfg(target_os = "linux")]
+    rustix::process::kill_process(rustix::process::Pid::from_child(child), rustix::process::Signal::INT)?;
+    #[cfg(not(target_os = "linux"))]
+    child.kill()?;
     Ok(())
 }
 
@@ -86,4 +123,22 @@ pub(crate) fn line(command: &Command) -> String {
         text.push_str(&arg.to_string_lossy());
     }
     text
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_that_does_not_end_is_ended() {
+        let error = run_within(Duration::ZERO, Command::new("sleep").arg("1000")).unwrap_err();
+        assert_eq!(error.to_string(), "`sleep 1000` had not ended after 0 s");
+    }
+
+    #[test]
+    fn a_program_that_ends_has_its_result() {
+        run_within(Duration::MAX, &mut Command::new("true")).unwrap();
+        let error = run_within(Duration::MAX, &mut Command::new("false")).unwrap_err();
+        assert_eq!(error.to_string(), "`false` failed (exit status: 1)");
+    }
 }

@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -25,6 +26,9 @@ const LANES: i32 = 15;
 
 /// The period of printing the number of finished tests.
 const PERIOD: Duration = Duration::from_secs(20);
+
+/// A test that runs for longer is named beside this number.
+const LONG: Duration = Duration::from_mins(3);
 
 /// An action with a name, which succeeds or fails.
 pub(super) struct Step {
@@ -54,8 +58,8 @@ struct Pool {
     all: usize,
     busy: Mutex<VecDeque<Step>>,
     waiting: Mutex<VecDeque<Step>>,
+    running: Mutex<Vec<(String, Instant)>>,
     finished: AtomicUsize,
-    told: Mutex<Instant>,
 }
 
 impl Pool {
@@ -67,22 +71,40 @@ impl Pool {
         let (waiting, busy): (VecDeque<Step>, VecDeque<Step>) =
             tests.into_iter().partition(|test| test.waits);
         let (busy, waiting) = (Mutex::new(busy), Mutex::new(waiting));
-        Pool { all, busy, waiting, finished: AtomicUsize::new(0), told: Mutex::new(Instant::now()) }
+        Pool { all, busy, waiting, running: Mutex::default(), finished: AtomicUsize::new(0) }
     }
 
-    /// Runs tests from a queue until it is empty. Now and then prints the number of finished tests.
+    /// Runs tests from a queue until it is empty.
     fn work(&self, queue: &Mutex<VecDeque<Step>>, run: impl Fn(Step)) {
         // The lock is released before the test runs.
         let next = || lock(queue).pop_front();
         while let Some(test) = next() {
+            let name = test.name.clone();
+            lock(&self.running).push((name.clone(), Instant::now()));
             run(test);
-            let finished = self.finished.fetch_add(1, Ordering::Relaxed) + 1;
-            let mut told = lock(&self.told);
-            if told.elapsed() >= PERIOD {
-                *told = Instant::now();
-                eprintln!("tests: {finished} of {}", self.all);
-            }
+            lock(&self.running).retain(|(running, _)| *running != name);
+            self.finished.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// Prints the number of finished tests each [`PERIOD`], until the other ends of the channel are gone.
+    fn tell(&self, end: &Receiver<()>) {
+        let mut told = 0;
+        while end.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
+            let (finished, long) = (self.finished.load(Ordering::Relaxed), self.long());
+            if finished != told || !long.is_empty() {
+                eprintln!("tests: {finished} of {}{long}", self.all);
+            }
+            told = finished;
+        }
+    }
+
+    /// The tests that run for longer than [`LONG`], with their times.
+    fn long(&self) -> String {
+        let running = lock(&self.running);
+        let long =
+            running.iter().map(|(name, begin)| (name, begin.elapsed())).filter(|(_, time)| *time > LONG);
+        long.map(|(name, time)| format!("; {name} runs for {} s", time.as_secs())).collect()
     }
 }
 
@@ -129,6 +151,8 @@ impl<'a> Report<'a> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
         let pool = &Pool::new(tests);
         thread::scope(|scope| {
+            let (work, end) = mpsc::channel();
+            scope.spawn(move || pool.tell(&end));
             for lane in lanes {
                 scope.spawn(|| {
                     step_back(LANES);
@@ -138,9 +162,11 @@ impl<'a> Report<'a> {
             let queues = [(&pool.busy, workers, TESTS), (&pool.waiting, WAITING * workers, 0)];
             for (queue, number, nice) in queues {
                 for _ in 0..number {
+                    let work = work.clone();
                     scope.spawn(move || {
                         step_back(nice);
                         pool.work(queue, |test| self.step(test, true));
+                        drop(work);
                     });
                 }
             }

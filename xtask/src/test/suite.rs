@@ -3,19 +3,26 @@
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
 use super::host::{self, TestProgram};
 use super::monitored;
 use super::report::{Step, last_times};
-use crate::command::{built, root, run};
+use crate::command::{built, root, run_within};
 use crate::images;
 use crate::own_tool::Tools;
 use crate::setup::python;
 
 /// Tests on the emulated board take the longest. They begin first when there are no times of a last run.
 const LONG: &str = "/board";
+
+/// The time after which a test, or a file of Python tests, has failed. On two busy cores the longest takes a fifth of it.
+const LIMIT: Duration = Duration::from_mins(20);
+
+/// The same with `thorough`, where the longest takes an hour.
+const THOROUGH_LIMIT: Duration = Duration::from_hours(6);
 
 /// All tests whose name contains `only`, the longest first. With `thorough`, sampling tests try everything.
 pub(super) fn collect(thorough: bool, only: Option<&str>) -> Result<Vec<Step>> {
@@ -66,7 +73,7 @@ fn one(program: &Path, directory: &Path, test: &str, thorough: bool) -> Result<(
         .args(["--exact", test, "--nocapture", "--include-ignored"])
         .current_dir(directory)
         .env("CARGO_MANIFEST_DIR", directory);
-    run(with_images(&mut command, thorough))
+    run_within(limit(thorough), with_images(&mut command, thorough))
 }
 
 /// The files of Python tests, each as a step.
@@ -83,9 +90,16 @@ fn of_python(thorough: bool) -> Result<Vec<Step>> {
 
 fn python(file: &Path, thorough: bool) -> Result<()> {
     let mut command = Command::new(python::clients()?);
-    command.args(["-m", "pytest", "-q", "--durations=3"]).arg(file).current_dir(root());
+    command
+        .args(["-m", "pytest", "-q", "--durations=3", "-o", "faulthandler_timeout=600"])
+        .arg(file)
+        .current_dir(root());
     command.env("IO_MODULE_COMMAND", built("examples/io_module"));
-    run(with_images(with_programs(&mut command), thorough))
+    run_within(limit(thorough), with_images(with_programs(&mut command), thorough))
+}
+
+fn limit(thorough: bool) -> Duration {
+    if thorough { THOROUGH_LIMIT } else { LIMIT }
 }
 
 /// Sets the variables by which Python finds the programs of the project.
