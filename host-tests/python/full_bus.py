@@ -134,13 +134,13 @@ class Client:
 
 
 def serve(bus: FullBus) -> tuple[subprocess.Popen, str]:
-    """The server on the bus, with its address."""
-    return serve_address(f"socketcand://127.0.0.1:{bus.port}/vcan0")
+    """The server on the bus, with its address. On a busy machine the nodes may answer late."""
+    return serve_address(f"socketcand://127.0.0.1:{bus.port}/vcan0", "--timeout", "20000")
 
 
-def serve_address(address: str) -> tuple[subprocess.Popen, str]:
+def serve_address(address: str, *flags: str) -> tuple[subprocess.Popen, str]:
     """The server on the bus with this address, with the address of its page."""
-    command = [os.environ["NODECTL_COMMAND"], "--json", "serve", address, "--page", "127.0.0.1:0"]
+    command = [os.environ["NODECTL_COMMAND"], "--json", *flags, "serve", address, "--page", "127.0.0.1:0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     return process, json.loads(process.stdout.readline())["page"]
 

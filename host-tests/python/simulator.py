@@ -244,11 +244,13 @@ class Listener:
         return self._frames.get(timeout=PATIENCE)
 
     def until(self, wanted) -> tuple[float, bytes]:
-        """The next frame with the wanted data."""
-        while True:
-            time, data = self.next()
+        """The next frame with the wanted data. Other frames do not make it wait for ever."""
+        end = time.monotonic() + 2 * PATIENCE
+        while time.monotonic() < end:
+            stamp, data = self.next()
             if wanted(data):
-                return time, data
+                return stamp, data
+        raise AssertionError("no frame has the wanted data")
 
 
 def nodectl(simulator: Simulator, *arguments, node: int = 1) -> subprocess.CompletedProcess:

@@ -1,8 +1,11 @@
 """The CiA 402 drive of the examples, driven by python-canopen: the state machine, its modes, its refusals."""
 
+import time
+
 import canopen
 import pytest
 from example import Bench, data_sheet
+from simulator import PATIENCE
 
 NODE = 6
 
@@ -41,8 +44,9 @@ class Drive(Bench):
                 return
 
     def wait_for_bit(self, bit: int, value: int) -> None:
+        end = time.monotonic() + PATIENCE
         while self.statusword() >> bit & 1 != value:
-            pass
+            assert time.monotonic() < end, f"bit {bit} of the statusword stays {1 - value}"
 
     def enable(self) -> None:
         self.state("OPERATIONAL", 5)

@@ -4,9 +4,11 @@ How much of a core it takes depends on the machine, and is measured by running f
 """
 
 import threading
+import time
 
 import pytest
 from full_bus import SIGNALS, Client, FullBus, memory, serve
+from simulator import PATIENCE
 
 SECONDS = 5.0
 
@@ -30,7 +32,9 @@ def test_every_sample_of_a_full_bus_reaches_the_page_once_and_in_order(served):
     sender.start()
     values = {signal: [] for signal in SIGNALS}
     expected = [float(turn) for turn in range(int(SECONDS * 8500) // 127) if turn % 67 != 66]
+    end = time.monotonic() + SECONDS + PATIENCE
     while not all(len(got) >= len(expected) for got in values.values()):
+        assert time.monotonic() < end, {signal: f"{len(got)} of {len(expected)}" for signal, got in values.items()}
         message = client.next()
         if message.get("event") == "live":
             assert message["lost"] == 0
@@ -53,7 +57,9 @@ def test_a_trace_shows_every_frame_or_says_how_many_are_missing(served):
     pdos = sum(bus.frame(number)[0] < 0x700 for number in range(int(SECONDS * 8500)))
     rows = lost = 0
     events = client.events
+    end = time.monotonic() + PATIENCE
     while rows + lost < pdos:
+        assert time.monotonic() < end, f"{rows} rows and {lost} lost of {pdos}"
         message = events.pop(0) if events else client.next()
         if message.get("event") == "trace":
             assert all(row["kind"] == "pdo" for row in message["rows"])

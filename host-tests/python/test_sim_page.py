@@ -59,7 +59,9 @@ def test_the_host_starts_the_nodes_although_the_page_looks_on():
     simulator = with_page("127.0.0.1:0")
     page = Client(simulator.greeting["page"])
     states = []
+    end = time.monotonic() + PATIENCE
     while "operational" not in states:
+        assert time.monotonic() < end, states
         states += [node["state"] for node in page.next().get("nodes", [])]
     simulator.quit()
 

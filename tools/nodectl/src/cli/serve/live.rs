@@ -99,6 +99,8 @@ struct Track {
 #[derive(Default)]
 pub(super) struct Live {
     surveys: BTreeMap<NodeId, Survey>,
+    /// The nodes whose survey may be wrong. Their signals stay as they are until the next survey.
+    doubtful: BTreeSet<NodeId>,
     wanted: BTreeSet<Key>,
     /// The followed signals that are read by SDO while their TPDO does not come.
     read: BTreeSet<Key>,
@@ -116,19 +118,22 @@ pub(super) struct Batch {
 }
 
 impl Live {
+    /// The survey of a node; `None` where it is forgotten.
     pub(super) fn survey(&self, node: NodeId) -> Option<&Survey> {
-        self.surveys.get(&node)
+        self.surveys.get(&node).filter(|_| !self.doubtful.contains(&node))
     }
 
     /// Takes the survey of a node.
     pub(super) fn learn(&mut self, node: NodeId, survey: Survey) {
         self.surveys.insert(node, survey);
+        self.doubtful.remove(&node);
         self.arrange();
     }
 
-    /// Forgets the survey of a node, because the node may have another mapping now.
+    /// Forgets the survey of a node, because the node may have another mapping now. Its samples are taken as before
+    /// until the node has a new one.
     pub(super) fn forget(&mut self, node: NodeId) {
-        self.surveys.remove(&node);
+        self.doubtful.insert(node);
     }
 
     /// Sets the signals to follow, and those of them to read by SDO while their TPDO does not come.
@@ -252,12 +257,12 @@ impl Live {
 
     /// A signal in the form for pages; `None` without a survey of its node.
     pub(super) fn describe(&self, key: Key) -> Option<Json> {
-        self.surveys.get(&key.node).map(|survey| shape(key, &survey.signal(key.at())))
+        self.survey(key.node).map(|survey| shape(key, &survey.signal(key.at())))
     }
 
     /// The signals that a node sends.
     pub(super) fn signals(&self, node: NodeId) -> Option<Vec<Json>> {
-        self.surveys.get(&node).map(|survey| survey.describe(node))
+        self.survey(node).map(|survey| survey.describe(node))
     }
 }
 
@@ -367,6 +372,26 @@ mod tests {
         assert_eq!(batch.json, r#"{"signal":"5:2000:2","t":[0.5,0.75],"v":[2,4]}"#);
         assert_eq!((batches.len(), batch.samples, lost), (1, 2, 0));
         assert!(live.take().0.is_empty());
+    }
+
+    /// Meanwhile another node is surveyed, too.
+    #[test]
+    fn the_samples_of_a_node_that_is_surveyed_again_are_kept() {
+        let (mut live, key) = (Live::default(), Key::new(node(), at(0x2000, 1)));
+        live.learn(node(), survey(&[(0x2000, 1, 8)]));
+        live.want(BTreeSet::from([key]), BTreeSet::new());
+        live.on_frame(&Frame::new(0x185, &[1]).unwrap(), 0.5);
+        live.forget(node());
+        assert!(
+            live.survey(node()).is_none() && live.signals(node()).is_none() && live.describe(key).is_none()
+        );
+        live.learn(NodeId::new(6).unwrap(), Survey::default());
+        live.want(BTreeSet::from([key]), BTreeSet::from([key]));
+        live.on_frame(&Frame::new(0x185, &[2]).unwrap(), 1.0);
+        live.learn(node(), survey(&[(0x2000, 2, 8), (0x2000, 1, 8)]));
+        live.on_frame(&Frame::new(0x185, &[9, 3]).unwrap(), 1.5);
+        assert_eq!(live.take().0[&key].json, r#"{"signal":"5:2000:1","t":[0.5,1.0,1.5],"v":[1,2,3]}"#);
+        assert!(live.survey(node()).is_some());
     }
 
     #[test]
