@@ -85,9 +85,10 @@ pub enum Interruption {
     Bus(#[from] BusError),
 }
 
-/// The units are read again this long after a boot-up of the node: a master configures the node first.
-const AFTER_BOOT: Duration = Duration::from_millis(500);
-/// The time between two tries to read the units.
+/// Mapping and units are read again this long after a boot-up of the node, or after the last write to its PDO
+/// parameters: a master configures the node first.
+const SETTLED: Duration = Duration::from_millis(500);
+/// The time between two tries to read mapping and units.
 const AGAIN: Duration = Duration::from_millis(1000);
 
 /// The content of the frames, in their order.
@@ -109,7 +110,7 @@ pub struct Acquisition<'n> {
     /// The transfers of other clients: on the default channel, and on the additional one.
     transfers: [Transfers; 2],
     news: VecDeque<News>,
-    /// When the numbers for the units are read again; `None` while they are known.
+    /// When the mapping and the numbers for the units are read again; `None` while they are known.
     refresh: Option<Instant>,
     /// When the polled signals are read next.
     due: Instant,
@@ -234,7 +235,6 @@ impl<'n> Acquisition<'n> {
     /// # Errors
     /// SDO errors, and a bus that is lost.
     pub fn next(&mut self, until: Instant) -> Result<Option<Sample>, Interruption> {
-        let has_polled = self.signals.iter().any(|signal| signal.tpdo.is_none());
         loop {
             if let Some(sample) = self.ready() {
                 self.has_values = true;
@@ -242,9 +242,10 @@ impl<'n> Acquisition<'n> {
             }
             let now = self.network.now();
             if self.refresh.is_some_and(|due| now >= due) {
-                self.read_units()?;
+                self.read_again()?;
                 continue;
             }
+            let has_polled = self.signals.iter().any(|signal| signal.tpdo.is_none());
             if has_polled && now >= self.due {
                 self.poll()?;
                 continue;
@@ -291,19 +292,36 @@ impl<'n> Acquisition<'n> {
         }
     }
 
-    /// Reads the numbers for the units again: values that are not saved are lost with a restart.
-    fn read_units(&mut self) -> Result<(), sdo::Error> {
+    /// Reads the mapping and the numbers for the units again: values that are not saved are lost with a restart. While
+    /// another client keeps the node from answering, the next try is later.
+    fn read_again(&mut self) -> Result<(), sdo::Error> {
         self.refresh = None;
+        match self.read_mapping().and_then(|()| self.read_units()) {
+            Err(error) if error.may_pass() && !error.is_bus_lost() => {
+                self.refresh = Some(self.network.now() + AGAIN);
+                Ok(())
+            }
+            result => result,
+        }
+    }
+
+    /// A signal that no TPDO carries any more is read by SDO.
+    fn read_mapping(&mut self) -> Result<(), sdo::Error> {
+        let mut client = Client::new(self.network, self.setup.node, self.setup.options);
+        self.tpdos = tpdo::read(&mut client, self.knowledge.catalogue())?;
+        for signal in &mut self.signals {
+            signal.tpdo = carrier(&self.tpdos, signal.at);
+        }
+        Ok(())
+    }
+
+    fn read_units(&mut self) -> Result<(), sdo::Error> {
         let mut sources = self.sources();
         sources.dedup();
         for object in sources {
             match Client::new(self.network, self.setup.node, self.setup.options).upload(object) {
                 Ok(bytes) => self.hear(object, &bytes),
-                Err(error) if error.may_pass() && !error.is_bus_lost() => {
-                    self.refresh = Some(self.network.now() + AGAIN);
-                    break;
-                }
-                Err(error) if error.abort().is_some() => (),
+                Err(error) if error.abort().is_some() && !error.may_pass() => (),
                 Err(error) => return Err(error),
             }
         }
@@ -322,7 +340,7 @@ impl<'n> Acquisition<'n> {
         if let Some(heard) = Heartbeat::parse(frame).filter(|heard| heard.node == self.setup.node) {
             self.state = Some(heard.state);
             if heard.state == State::Initialising {
-                self.refresh = Some(self.network.now() + AFTER_BOOT);
+                self.refresh = Some(self.network.now() + SETTLED);
             }
         }
         if let Some((node, is_additional, frame)) = self.network.sdo(frame)
@@ -343,9 +361,12 @@ impl<'n> Acquisition<'n> {
     fn overhear(&mut self, is_additional: bool, frame: &Frame, at: Instant) {
         let transfers = &mut self.transfers[usize::from(is_additional)];
         for ended in transfers.on_frame(self.setup.node, frame, at) {
-            if let Some(bytes) = ended.value() {
-                self.news.push_back(News::Told { object: ended.at, bytes: bytes.to_vec() });
+            let Some(bytes) = ended.value() else { continue };
+            if let Some(tpdo) = remapped(ended.at).filter(|_| ended.is_write) {
+                self.tpdos.retain(|known| known.number != tpdo);
+                self.refresh = Some(self.network.now() + SETTLED);
             }
+            self.news.push_back(News::Told { object: ended.at, bytes: bytes.to_vec() });
         }
     }
 
@@ -477,14 +498,28 @@ fn mapped(tpdos: &[Tpdo]) -> Vec<Multiplexer> {
     objects
 }
 
+/// The number of the TPDO, from 1, whose CAN-ID or mapping an object is. CiA 301: 1800h to 19FFh, 1A00h to 1BFFh.
+fn remapped(object: Multiplexer) -> Option<u16> {
+    match (object.index, object.sub) {
+        (0x1800..=0x19FF, 1) | (0x1A00..=0x1BFF, _) => Some((object.index & 0x1FF) + 1),
+        _ => None,
+    }
+}
+
+/// The number of the TPDO that carries an object.
+fn carrier(tpdos: &[Tpdo], object: Multiplexer) -> Option<u16> {
+    let is_in = |tpdo: &&Tpdo| {
+        tpdo.mapping.iter().any(|mapped| (mapped.index, mapped.sub) == (object.index, object.sub))
+    };
+    tpdos.iter().find(is_in).map(|tpdo| tpdo.number)
+}
+
 fn signal(
     client: &mut Client,
     knowledge: &mut Knowledge,
     tpdos: &[Tpdo],
     at: Multiplexer,
 ) -> Result<Signal, sdo::Error> {
-    let is_in =
-        |tpdo: &&Tpdo| tpdo.mapping.iter().any(|mapped| (mapped.index, mapped.sub) == (at.index, at.sub));
     let quantity = knowledge.ask_quantity(client, at)?;
     let catalogue = knowledge.catalogue();
     Ok(Signal {
@@ -492,7 +527,7 @@ fn signal(
         name: catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default(),
         path: catalogue.name(at),
         unit: quantity.unit.clone(),
-        tpdo: tpdos.iter().find(is_in).map(|tpdo| tpdo.number),
+        tpdo: carrier(tpdos, at),
         data_type: catalogue.data_type(at),
         quantity,
     })

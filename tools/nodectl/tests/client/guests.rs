@@ -375,7 +375,7 @@ fn a_new_unit_is_a_change() {
 #[test]
 fn a_column_of_a_recording_has_one_unit() {
     let wire = writes(0x6131, KILOPASCAL);
-    let rows = printed_to_file(&wire, &["--start", "--for", "12"]);
+    let rows = printed_to_file(&wire, "units", &["--start", "--for", "12"]);
     let (head, rows) = rows.split_once('\n').expect("a table");
     assert!(head.contains("6130h:1 Pressure process value [bar]"), "{head}");
     let cells: Vec<Vec<&str>> = rows.lines().map(|row| row.split(',').collect()).collect();
@@ -383,8 +383,8 @@ fn a_column_of_a_recording_has_one_unit() {
     assert!(cells.iter().rev().take(3).all(|row| row[1].is_empty()), "{rows}");
 }
 
-fn printed_to_file<S: Station + 'static>(wire: &Wire<S>, flags: &[&str]) -> String {
-    let path = std::env::temp_dir().join(format!("nodectl-units-{}.csv", std::process::id()));
+fn printed_to_file<S: Station + 'static>(wire: &Wire<S>, name: &str, flags: &[&str]) -> String {
+    let path = std::env::temp_dir().join(format!("nodectl-{name}-{}.csv", std::process::id()));
     let line = [&["record", "--csv", path.to_str().expect("text")][..], flags].concat();
     printed(wire, &line);
     let text = std::fs::read_to_string(&path).expect("a table");
@@ -402,4 +402,42 @@ fn the_monitor_reads_the_unit_again_after_a_restart() {
     let lines = printed(&wire, &["monitor", "--start", "--count", "24"]);
     assert!(lines.lines().next().is_some_and(|line| line.contains("kPa")), "{lines}");
     assert!(lines.lines().rev().take(2).any(|line| line.ends_with(" bar")), "{lines}");
+}
+
+/// Another client that puts the status before the pressure in TPDO 1, six seconds after the start.
+fn remaps() -> Wire<Scripted> {
+    let writes: [(u16, u8, u32); 6] = [
+        (0x1800, 1, 0x8000_0181),
+        (0x1A00, 0, 0),
+        (0x1A00, 1, 0x6150_0108),
+        (0x1A00, 2, 0x6130_0120),
+        (0x1A00, 0, 2),
+        (0x1800, 1, 0x0000_0181),
+    ];
+    let frame_of = |(index, sub, value): (u16, u8, u32)| {
+        let [low, high] = index.to_le_bytes();
+        let [a, b, c, d] = value.to_le_bytes();
+        let command = if (index, sub) == (0x1A00, 0) { 0x2F } else { 0x23 };
+        frame(0x601, [command, low, high, sub, a, b, c, d])
+    };
+    let at = |number: usize| Instant(6_000_000 + 20_000 * number as u64);
+    let mut frames: Vec<_> =
+        writes.into_iter().enumerate().map(|(number, write)| (at(number), frame_of(write))).collect();
+    // The status 1 and 1 bar, right after the change and later.
+    let tpdo = Frame::new(0x181, &[1, 0, 0, 0x80, 0x3F]).expect("a frame");
+    frames.extend([6_130_000, 8_000_000].map(|at| (Instant(at), tpdo)));
+    Wire::new(Scripted { node: Pressure::new(1), frames })
+}
+
+#[test]
+fn a_mapping_that_another_client_writes_is_followed() {
+    let lines = printed(&remaps(), &["monitor", "--start", "--count", "40"]);
+    let values: Vec<&str> = lines.lines().filter(|line| line.contains("6130h:1")).collect();
+    let is_whole = |line: &&&str| line.contains("= 0 bar") || line.contains("= 1 bar");
+    assert!(values.iter().all(|line| is_whole(&line)), "bytes of another object: {lines}");
+    assert_eq!(values.iter().filter(|line| line.contains("= 1 bar")).count(), 1, "{lines}");
+    let rows = printed_to_file(&remaps(), "mapping", &["--start", "--for", "12"]);
+    let cells: Vec<&str> = rows.lines().skip(1).filter_map(|row| row.split(',').nth(1)).collect();
+    assert!(cells.iter().all(|cell| ["", "0", "1"].contains(cell)), "{rows}");
+    assert!(cells.contains(&"1"), "{rows}");
 }
