@@ -522,7 +522,10 @@ fn a_new_bit_rate_is_handed_over_beside_a_reset() {
     let mut bench = changing_its_bit_rate();
     let reset = Frame::new(0, &[RESET_COMMUNICATION, ID]).unwrap();
     let _ = bench.device.on_process_frame(&reset, bench.now, &mut bench.out);
-    assert_eq!(actions(&mut bench), [Action::ResetCommunication, Action::BitRate(BitRate::K125)]);
+    assert_eq!(
+        actions(&mut bench),
+        [Action::ResetCommunication, Action::BitRate(BitRate::from_kbit(125).unwrap())]
+    );
 }
 
 #[test]
@@ -530,7 +533,7 @@ fn new_identifiers_are_handed_over_beside_a_new_bit_rate() {
     let mut bench = changing_its_bit_rate();
     let off = Frame::new(0x600 + u16::from(ID), &[0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x80]).unwrap();
     let next = bench.device.on_service_frame(&off, bench.now, &mut bench.out);
-    assert_eq!(next.action, Some(Action::BitRate(BitRate::K125)));
+    assert_eq!(next.action, Some(Action::BitRate(BitRate::from_kbit(125).unwrap())));
     assert!(next.services <= bench.now, "the services are due for the next action");
     assert_eq!(actions(&mut bench), [Action::Identifiers]);
 }
