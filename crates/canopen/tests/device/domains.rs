@@ -7,6 +7,7 @@ use canopen::nmt::Command;
 use canopen::sdo::{Abort, BlockSize, Multiplexer, Request};
 use canopen::{Application, Device, Frame, Instant, NodeId, Part, objects};
 
+use crate::exchange;
 use crate::types::Sent;
 
 const ID: u8 = 5;
@@ -347,4 +348,47 @@ fn an_empty_domain_is_read_as_no_byte_by_the_requested_protocol() {
         }
         assert_eq!(block_upload_of(&mut node, at, |_| false), Ok(vec![]), "{at:?}");
     }
+}
+
+/// Domains in parts, of which the application serves reading as one slice.
+struct Slice;
+
+impl Application for Slice {
+    const DOMAIN_PARTS: bool = true;
+
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
+        Ok(b"a slice")
+    }
+}
+
+/// Domains in parts, of which the application gives the length alone.
+struct Length;
+
+impl Application for Length {
+    const DOMAIN_PARTS: bool = true;
+
+    fn begin_upload(&mut self, _: Multiplexer) -> Result<Option<usize>, Abort> {
+        Ok(Some(3))
+    }
+}
+
+/// What an application does not serve is refused, and nothing of it is answered with zeros.
+#[test]
+fn a_domain_that_the_application_does_not_serve_is_refused() {
+    fn of<D: canopen::Definition>(mut node: Device<D>) -> (Result<Vec<u8>, u32>, Result<(), u32>) {
+        let _ = node.start(Instant(0), &mut Sent::default());
+        let mut answer = |request: Frame| {
+            let mut sent = Sent::default();
+            let _ = node.on_service_frame(&request, Instant(1), &mut sent);
+            sent.0
+        };
+        (exchange::read(ID, LOG, &mut answer), exchange::write(ID, LOG, &[1, 2, 3], &mut answer))
+    }
+    let slice: canopen::device!(Slice, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Slice);
+    let length: canopen::device!(Length, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Length);
+    let nothing: canopen::device!((), ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), ());
+    let refused = Abort::Access.code();
+    assert_eq!(of(slice), (Ok(b"a slice".to_vec()), Err(refused)));
+    assert_eq!(of(length), (Err(refused), Err(refused)));
+    assert_eq!(of(nothing), (Err(refused), Err(refused)));
 }

@@ -82,3 +82,22 @@ fn the_list_has_no_more_errors_than_1003h_has_entries() {
     assert_eq!(listed(&mut node, 0), [4]);
     assert_eq!(listed(&mut node, 4), [0x10, 0x23, 3, 7]);
 }
+
+/// A condition with an error field of its own, and an application that gives none.
+struct Fixed;
+
+impl Application for Fixed {
+    const CONDITIONS: &'static [Condition] =
+        &[Condition { detail: [1, 2, 3, 4, 5], ..Condition::new(0x2310) }];
+}
+
+#[test]
+fn an_emcy_has_the_error_field_of_its_condition_by_default() {
+    let mut node: canopen::device!(Fixed, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Fixed);
+    let mut sent = Sent::default();
+    let _ = node.start(Instant(0), &mut sent);
+    sent.0.clear();
+    let _ = node.set_condition(0, true, Instant(1));
+    let _ = node.poll(Instant(1), &mut sent);
+    assert_eq!(sent.0, [Frame::new(0x085, &[0x10, 0x23, 1, 1, 2, 3, 4, 5]).unwrap()]);
+}

@@ -193,3 +193,18 @@ fn an_event_of_a_sync_waits_for_room_in_the_queue() {
         assert_eq!(told(&mut bench), [2]);
     }
 }
+
+/// The application is asked after `publish`, and otherwise only when the inhibit time or the event timer is over.
+#[test]
+fn a_call_before_the_deadline_asks_for_no_event() {
+    let mut bench = operational(255, 0, 0);
+    bench.device.application_mut().events.push_back([7, 0, 0, 0]);
+    for _ in 0..3 {
+        let next = bench.device.poll_process(bench.now, &mut bench.out);
+        assert!(next.process > bench.now, "nothing is due");
+    }
+    bench.run(MS);
+    assert_eq!(told(&mut bench), [0; 0]);
+    publish(&mut bench);
+    assert_eq!(told(&mut bench), [7]);
+}

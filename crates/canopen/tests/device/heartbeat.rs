@@ -129,3 +129,21 @@ fn entries_are_checked_and_an_unused_one_ends_the_watch() {
     }
     assert_eq!(emergencies(&mut bench), [(0, 0, 0)]);
 }
+
+/// 1016h:2 is node 9 with 100 ms.
+#[test]
+fn a_stored_node_is_watched_after_a_reset_and_a_restored_one_is_not() {
+    let mut bench = Bench::booted();
+    let watches = |bench: &Bench| bench.device.service_ids().any(|id| id.get() == 0x709);
+    for (stored, is_watched) in [(vec![0x16, 0x10, 2, 1, 4, 100, 0, 9, 0], true), (vec![], false)] {
+        bench.device.application_mut().stored[0] = stored;
+        bench.nmt(0x82);
+        bench.start();
+        bench.take();
+        assert_eq!(watches(&bench), is_watched);
+        beat(&mut bench, 9);
+        bench.run(Duration::from_millis(100));
+        let expected = if is_watched { vec![(0x30, 0x81, 2)] } else { vec![] };
+        assert_eq!(emergencies(&mut bench), expected);
+    }
+}

@@ -368,3 +368,37 @@ fn a_new_number_of_the_scanner_list_applies_at_once() {
     bench.set_value(2, &[8, 0]);
     assert_eq!(mpdos(&mut bench), [[0; 8]; 0], "no line is left");
 }
+
+/// Another use of the same function code: shorter frames, and frames that name no object of this device.
+#[test]
+fn a_frame_that_is_no_multiplexed_pdo_is_no_error_of_the_rpdo_for_all_nodes() {
+    for data in [&[1, 2][..], &[], &[0x80 | ID, 0x00, 0x70, 0, 1, 2, 3, 4]] {
+        let mut bench = receiver_of_all();
+        bench.receive(Frame::new(0x210, data).unwrap());
+        assert_eq!((value(&bench), errors(&mut bench)), (0, vec![]), "{data:x?}");
+    }
+}
+
+#[test]
+fn an_rpdo_takes_the_frames_of_all_nodes_only_if_it_is_multiplexed_and_the_application_says_so() {
+    for (all_nodes_rpdo, count) in [(0, DESTINATION), (1, 1)] {
+        let mut bench = Bench::operational();
+        bench.device.application_mut().all_nodes_rpdo = all_nodes_rpdo;
+        bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+        bench.write(0x1600, 0, &[count]).unwrap();
+        bench.write32(0x1400, 1, RPDO.into()).unwrap();
+        bench.take();
+        bench.receive(Frame::new(RPDO + 1, &[0x80, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap());
+        assert_eq!((value(&bench), errors(&mut bench)), (0, vec![]), "{count}");
+        assert!(bench.device.process_ids().all(|id| id.get() != RPDO + 1), "{count}");
+        assert!(bench.device.process_filters().all(|(_, mask)| mask == 0x7FF), "{count}");
+    }
+}
+
+#[test]
+fn the_identifiers_are_those_of_the_own_frames_and_then_of_each_of_127_nodes() {
+    let bench = receiver_of_all();
+    let ids = bench.device.process_ids().map(canopen::CanId::get);
+    let expected = [0x000, 0x080, RPDO, 0x185].into_iter().chain(0x201..=0x27F);
+    assert!(ids.eq(expected), "{:03X?}", bench.device.process_ids().collect::<Vec<_>>());
+}

@@ -3,10 +3,10 @@
 use crate::bench::{Bench, DEVICE_FAULT, DICTIONARY, ID, SENSOR_BREAK, UNEXPECTED_RESET};
 use crate::service_device::Loader;
 use crate::types::Sent;
-use canopen::dictionary::{Access, Dictionary, Object, Type};
+use canopen::dictionary::{Access, Dictionary, Group, Groups, Object, Type};
 use canopen::lss::{BitRate, Request};
 use canopen::nmt::State;
-use canopen::{Action, BusEvent, Device, Duration, ErrorClass, Frame, Instant, NodeId, objects};
+use canopen::{Action, BusEvent, Device, Duration, ErrorClass, Frame, Instant, Job, NodeId, objects};
 
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -465,4 +465,87 @@ fn a_reset_of_the_communication_keeps_the_objects_from_2000h_on() {
         let values = AREAS.map(|index| DICTIONARY.field(index, 0).u8(node.image()));
         assert_eq!(values, expected, "{command:X}h");
     }
+}
+
+#[test]
+fn the_debug_output_of_a_device_has_its_node_id_and_its_state() {
+    let text = format!("{:?}", Bench::operational().device);
+    assert_eq!(text, "Device { node_id: Some(NodeId(5)), state: Operational, .. }");
+}
+
+/// The actions that the services hand over at this instant, one for each call.
+fn actions(bench: &mut Bench) -> Vec<Action> {
+    let mut actions = vec![];
+    loop {
+        let next = bench.device.poll_services(bench.now, &mut bench.out);
+        actions.extend(next.action);
+        if next.services > bench.now {
+            return actions;
+        }
+    }
+}
+
+/// The services are due until the caller has every action.
+#[test]
+fn a_reset_and_a_job_of_an_rpdo_are_both_handed_over() {
+    let application = Groups::one(Group::Application);
+    let mut bench = Bench::operational();
+    bench.write32(0x1600, 1, 0x6201_0008).unwrap();
+    bench.write(0x1600, 0, &[1]).unwrap();
+    bench.write32(0x1400, 1, 0x205).unwrap();
+    bench.device.application_mut().stores = Some(application);
+    actions(&mut bench);
+    for frame in [Frame::new(0x205, &[7]), Frame::new(0, &[RESET_COMMUNICATION, ID])] {
+        let _ = bench.device.on_process_frame(&frame.unwrap(), bench.now, &mut bench.out);
+    }
+    let expected = [Action::ResetCommunication, Action::Store(Job::Store(application))];
+    assert_eq!(actions(&mut bench), expected);
+}
+
+/// A device whose bus changes to 125 kbit/s at this instant.
+fn changing_its_bit_rate() -> Bench {
+    let mut bench = Bench::booted();
+    for request in [
+        Request::SwitchGlobal { configuration: true },
+        Request::BitTiming { table: 0, index: 4 },
+        Request::Activate { delay: 10 },
+    ] {
+        bench.receive(Frame::new(0x7E5, &request.encode()).unwrap());
+    }
+    actions(&mut bench);
+    bench.now = bench.now + Duration::from_millis(10);
+    bench
+}
+
+#[test]
+fn a_new_bit_rate_is_handed_over_beside_a_reset() {
+    let mut bench = changing_its_bit_rate();
+    let reset = Frame::new(0, &[RESET_COMMUNICATION, ID]).unwrap();
+    let _ = bench.device.on_process_frame(&reset, bench.now, &mut bench.out);
+    assert_eq!(
+        actions(&mut bench),
+        [Action::ResetCommunication, Action::BitRate(BitRate::from_kbit(125).unwrap())]
+    );
+}
+
+#[test]
+fn new_identifiers_are_handed_over_beside_a_new_bit_rate() {
+    let mut bench = changing_its_bit_rate();
+    let off = Frame::new(0x600 + u16::from(ID), &[0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x80]).unwrap();
+    let next = bench.device.on_service_frame(&off, bench.now, &mut bench.out);
+    assert_eq!(next.action, Some(Action::BitRate(BitRate::from_kbit(125).unwrap())));
+    assert!(next.services <= bench.now, "the services are due for the next action");
+    assert_eq!(actions(&mut bench), [Action::Identifiers]);
+}
+
+/// A caller that starts the device again before it has asked for the action.
+#[test]
+fn a_start_carries_out_a_reset_that_has_not_been_handed_over() {
+    let mut bench = Bench::booted();
+    actions(&mut bench);
+    let reset = Frame::new(0, &[RESET_COMMUNICATION, ID]).unwrap();
+    let _ = bench.device.on_process_frame(&reset, bench.now, &mut bench.out);
+    let next = bench.device.start(bench.now, &mut bench.out);
+    assert_eq!(next.action, Some(Action::Identifiers));
+    assert_eq!(actions(&mut bench), []);
 }

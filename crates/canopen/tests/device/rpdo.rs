@@ -157,3 +157,31 @@ fn a_remote_frame_is_no_data() {
     bench.receive(Frame::remote(RPDO1, 2).unwrap());
     assert_eq!((value(&mut bench), bench.take()), (vec![0, 0], vec![]));
 }
+
+#[test]
+fn the_identifiers_are_those_of_nmt_sync_rpdos_and_requests_for_tpdos() {
+    let mut bench = bench();
+    let ids = |bench: &Bench| bench.device.process_ids().map(canopen::CanId::get).collect::<Vec<_>>();
+    assert_eq!(ids(&bench), [0x000, 0x080, RPDO1, RPDO2]);
+    bench.write32(0x1800, 1, 0x185).unwrap();
+    assert_eq!(ids(&bench), [0x000, 0x080, RPDO1, RPDO2, 0x185]);
+    let filters = bench.device.process_filters().map(|(id, mask)| (id.get(), mask));
+    assert!(filters.eq(ids(&bench).into_iter().map(|id| (id, 0x7FF))));
+}
+
+/// 6201h is handled by the application, which may change its parameters; 6200h and 6203h are plain values, and 6203h has
+/// limits.
+#[test]
+fn a_value_for_the_application_may_change_parameters_and_another_one_does_not() {
+    for (mapped, is_reported) in [(0x6200_0010, false), (0x6201_0008, true), (0x6203_0010, false)] {
+        let mut bench = bench();
+        bench.write32(0x1400, 1, 0x8000_0205).unwrap();
+        bench.write(0x1600, 0, &[0]).unwrap();
+        bench.write32(0x1600, 1, mapped).unwrap();
+        bench.write(0x1600, 0, &[1]).unwrap();
+        bench.write32(0x1400, 1, RPDO1.into()).unwrap();
+        bench.take_parameters();
+        send(&mut bench, RPDO1, &[1, 0][..usize::from(mapped.to_le_bytes()[0] / 8)]);
+        assert_eq!(bench.take_parameters(), is_reported, "{mapped:X}h");
+    }
+}

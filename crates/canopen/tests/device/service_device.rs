@@ -222,3 +222,50 @@ fn a_default_cob_id_includes_the_node_id() {
     let mut bench = Bench::booted();
     assert_eq!(bench.read(0x1200, 1), Ok((0x600 + u32::from(ID)).to_le_bytes().to_vec()));
 }
+
+/// Objects of services that a service device lacks, with rules for their values.
+const UNUSED: &[Object] = canopen::rows!(
+    [objects::device_type(0x0001_0191), objects::error_register(), objects::time_stamp()],
+    objects::error_field::<3>(),
+    objects::sync_consumer(),
+    objects::heartbeat_consumer::<3>(),
+    objects::identity(1, 2, 3),
+    objects::emcy_consumer::<3>(),
+    objects::sdo_server(2),
+    objects::sdo_client(1),
+    objects::tpdo(1, &[VALUE]),
+    [VALUE],
+);
+static UNUSED_DICTIONARY: Dictionary = canopen::dictionary!(UNUSED);
+
+/// A device that has the service would refuse each of these values.
+#[test]
+fn rows_of_other_services_hold_any_value_and_there_is_no_list_of_errors() {
+    let mut device: canopen::service_device!((), UNUSED) =
+        ServiceDevice::new(&UNUSED_DICTIONARY, NodeId::new(ID), ());
+    let _ = device.start(Instant(0), &mut Sent::default());
+    let mut answer = |request: Frame| {
+        let mut out = Sent::default();
+        let _ = device.on_frame(&request, Instant(1), &mut out);
+        out.0
+    };
+    let cob_id = 0x701_u32.to_le_bytes();
+    let values: [(u16, u8, &[u8]); 7] = [
+        (0x1012, 0, &cob_id),
+        (0x1016, 1, &0x0109_0064_u32.to_le_bytes()),
+        (0x1019, 0, &[1]),
+        (0x1028, 1, &cob_id),
+        (0x1201, 1, &cob_id),
+        (0x1280, 1, &cob_id),
+        (0x1A00, 0, &[0]),
+    ];
+    for (index, sub, value) in values {
+        let at = Multiplexer { index, sub };
+        assert_eq!(exchange::write(ID, at, value, &mut answer), Ok(()), "{index:X}h");
+        assert_eq!(exchange::read(ID, at, &mut answer), Ok(value.to_vec()), "{index:X}h");
+    }
+    for sub in [0, 1] {
+        let at = Multiplexer { index: 0x1003, sub };
+        assert_eq!(exchange::read(ID, at, &mut answer), Err(Abort::NoData.code()));
+    }
+}

@@ -4,7 +4,7 @@ use crate::bench::{Bench, DICTIONARY, ID};
 use canopen::dictionary::{Access, Group, Groups, Object, Type, is_packed, packed_size};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer, Request};
-use canopen::{Action, Job, NodeId};
+use canopen::{Action, Damage, Job, NodeId, Soundness};
 
 const SAVE: [u8; 4] = *b"save";
 const LOAD: [u8; 4] = *b"load";
@@ -362,4 +362,20 @@ fn a_value_beyond_its_limits_is_stored_as_its_default() {
     assert_eq!(bench.read(0x6103, 0), Ok(b"kept".to_vec()));
     assert_eq!((bench.read(0x6100, 0), bench.read(0x6101, 0)), (Ok(vec![0, 0]), Ok(vec![0; 4])));
     assert_eq!(bench.read(0x1029, 1), Ok(vec![0]));
+}
+
+#[test]
+fn the_soundness_of_each_group_is_kept_apart() {
+    for soundness in [Soundness::Whole, Soundness::Older, Soundness::Lost] {
+        for group in Group::ALL {
+            let mut damage = Damage::NONE;
+            damage.set(group, soundness);
+            for other in Group::ALL {
+                let expected = if other == group { soundness } else { Soundness::Whole };
+                assert_eq!(damage.of(other), expected, "{group:?}, {other:?}");
+            }
+            damage.set(group, Soundness::Whole);
+            assert_eq!(damage, Damage::NONE);
+        }
+    }
 }

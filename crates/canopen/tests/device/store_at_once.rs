@@ -231,3 +231,21 @@ fn a_restore_is_ended_by_a_save_and_by_the_reset_only() {
         }
     }
 }
+
+/// A restore that fails leaves the stored values, and a save that fails leaves a restore that waits.
+#[test]
+fn a_job_that_fails_neither_begins_nor_ends_the_wait_of_a_restore() {
+    const LOAD: [u8; 8] = [0x23, 0x11, 0x10, 3, b'l', b'o', b'a', b'd'];
+    let run = |bench: &mut Bench, data, result| {
+        request(bench, data);
+        job(bench);
+        assert_eq!(finish(bench, result)[0][0], if result.is_ok() { 0x60 } else { 0x80 });
+    };
+    let mut bench = booted();
+    run(&mut bench, LOAD, Err(Abort::Hardware));
+    run(&mut bench, preset(7), Ok(()));
+    assert_eq!(value(&bench), 7, "no restore waits");
+    run(&mut bench, LOAD, Ok(()));
+    run(&mut bench, SAVE, Err(Abort::Hardware));
+    assert_eq!((bench.write(PRESET, 0, &[8]), value(&bench)), (Err(DEVICE_STATE), 7), "the restore waits");
+}

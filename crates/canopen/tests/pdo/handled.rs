@@ -5,7 +5,7 @@ use canopen::sdo::Abort;
 use canopen::{Application, Device, Frame, Instant, NodeId, objects};
 use std::cell::Cell;
 
-use crate::bench::{ID, Sent, download};
+use crate::bench::{ID, Nothing, Sent, download};
 
 const VALUE: Object =
     Object::new(0x6000, 0, "", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo).value(9);
@@ -78,4 +78,18 @@ fn a_handled_write_switches_a_pdo_at_once() {
     assert_eq!(frames(&mut device, 1_000_000), 0, "TPDO 1 is off");
     assert_eq!(download(&mut device, (0x2011, 0), &[1], Instant(2_000_000)), Ok(()));
     assert_eq!(frames(&mut device, 3_000_000), 1, "TPDO 1 is on");
+}
+
+/// Reading the settings of all PDOs takes time, so an application has to ask for it.
+#[test]
+fn an_application_switches_no_pdo_by_default() {
+    let mut device: canopen::device!(Nothing, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Nothing);
+    let mut sent = Sent::default();
+    let _ = device.start(Instant(0), &mut sent);
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(1), &mut sent);
+    device.show(|_, image| COB_ID.store(image, (1_u32 << 31 | 0x185).to_le_bytes()));
+    assert_eq!(download(&mut device, (0x2010, 0), &[1], Instant(2)), Ok(()));
+    sent.0.clear();
+    let _ = device.send_tpdo(1, Instant(1_000_000), &mut sent);
+    assert_eq!(sent.0.len(), 1, "TPDO 1 is on");
 }

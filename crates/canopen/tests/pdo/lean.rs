@@ -1,8 +1,11 @@
 //! Devices whose rows lack a service: what remains works, and the service is refused or ignored.
 
-use canopen::dictionary::{Access, Dictionary, Mapping, Object, Services, Sizes, Type};
+use canopen::dictionary::{Access, Dictionary, Group, Mapping, Object, Services, Sizes, Type};
 use canopen::nmt::State;
-use canopen::{Application, Condition, Definition, Device, ErrorClass, Frame, Instant, NodeId, objects};
+use canopen::{
+    Application, Condition, Definition, Device, ErrorClass, Frame, Instant, NodeId, Soundness, Stored,
+    objects,
+};
 
 use crate::bench::{ID, Nothing, Sent, download};
 
@@ -260,4 +263,30 @@ fn block_transfers_and_lss_can_be_left_out() {
     assert_eq!(answer(0x7E5, [0x5E, 0, 0, 0, 0, 0, 0, 0]), Vec::<Vec<u8>>::new(), "LSS: node-ID");
     assert_eq!(answer(request, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0])[0][..4], [0x43, 0x00, 0x10, 0]);
     assert!(device.service_ids().all(|id| id.get() != 0x7E5));
+}
+
+/// Stored values of a firmware whose TPDO answered remote frames.
+struct Older;
+
+impl Application for Older {
+    fn stored(&self, group: Group) -> Stored<'_> {
+        const TPDO_1: &[u8] = &[0x00, 0x18, 1, 1, 4, 0x90, 0x01, 0x00, 0x00];
+        let packed = if group == Group::Communication { TPDO_1 } else { &[] };
+        Stored { packed, soundness: Soundness::Whole }
+    }
+}
+
+#[test]
+fn without_remote_frames_a_stored_cob_id_that_allows_them_asks_for_none() {
+    let (mut device, mut sent): (canopen::device!(Older, SILENT_ROWS), _) =
+        (Device::new(&SILENT, NodeId::new(ID), Older), Sent::default());
+    let _ = device.start(Instant(0), &mut sent);
+    assert_eq!(SILENT.field(0x1800, 1).u32(device.image()), 0x190, "the value is loaded");
+    let ids: Vec<u16> = device.process_ids().map(canopen::CanId::get).collect();
+    assert_eq!(ids, [0x000, 0x205]);
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(1), &mut sent);
+    let _ = device.poll(Instant(2), &mut sent);
+    sent.0.clear();
+    let _ = device.on_frame(&Frame::remote(0x190, 1).unwrap(), Instant(3), &mut sent);
+    assert_eq!(sent.0, []);
 }
