@@ -153,7 +153,8 @@ pub trait Application {
 
     /// The groups to store when this entry is written, by SDO or by an RPDO, as a write to 1010h would. The SDO response
     /// is sent when the groups are stored. The device asks before the write: if they cannot be stored, or if a restore of
-    /// one of them (1011h) waits for its reset, the write is refused and has no effect.
+    /// one of them (1011h) waits for its reset, the write is refused and has no effect. For a mapped object the device also
+    /// asks when the mapping is enabled, so an object that is stored at once is so from the start.
     fn stores(&self, _entry: &Entry) -> Option<Groups> {
         None
     }

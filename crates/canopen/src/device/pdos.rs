@@ -10,8 +10,8 @@ use super::inner::Inner;
 use super::rpdos::filter_bit;
 use crate::dictionary::{Direction, Entry, Rule, Services};
 use crate::pdo::{
-    Addressing, Chain, Content, Layout, Links, MappedObject, RpdoSettings, ScannerSettings, Settings,
-    Transmission, locate,
+    Addressing, Chain, Content, Layout, Links, Located, MappedObject, RpdoSettings, ScannerSettings,
+    Settings, Transmission, locate,
 };
 use crate::sdo::Abort;
 use crate::{CobId, Tick};
@@ -301,9 +301,13 @@ impl<D: Definition> Inner<D> {
         let mut layout = Layout::EMPTY;
         for slot in 0..count {
             let mapped = MappedObject::parse(self.number(pdo.mapping(), slot + 1));
-            layout.push(locate(self.dictionary, mapped, pdo.direction())?)?;
+            layout.push(self.locate(mapped, pdo.direction())?)?;
         }
         Ok(layout)
+    }
+
+    fn locate(&self, mapped: MappedObject, direction: Direction) -> Result<Located, Abort> {
+        locate(self.dictionary, mapped, direction, |entry| self.application.stores(entry).is_some())
     }
 
     fn parameter(&self, pdo: Pdo, sub: u8) -> u32 {
@@ -383,7 +387,7 @@ impl<D: Definition> Inner<D> {
         if value == 0 {
             return Ok(());
         }
-        locate(self.dictionary, MappedObject::parse(value), pdo.direction()).map(|_| ())
+        self.locate(MappedObject::parse(value), pdo.direction()).map(|_| ())
     }
 }
 

@@ -256,7 +256,6 @@ impl<D: Definition> Inner<D> {
             (Rule::StoreCalibration, SAVE) => Ok(Job::Store(Groups::one(Group::Calibration))),
             (Rule::Store, SAVE) => self.groups_of(entry).map(Job::Store),
             (Rule::Restore, LOAD) => self.groups_of(entry).map(Job::Restore),
-            (Rule::Store | Rule::Restore, _) => self.groups_of(entry).and(Err(Abort::NotStored)),
             _ => Err(Abort::NotStored),
         }
     }

@@ -1,7 +1,7 @@
 //! PDO mapping: mapping entries are resolved to locations in the image once, when the mapping is enabled. Linked lists of
 //! PDOs, so that SYNC, reception and polling visit only the PDOs concerned, of up to 512.
 
-use crate::dictionary::{Addressing, Dictionary, Direction, Field, MappedObject};
+use crate::dictionary::{Addressing, Dictionary, Direction, Entry, Field, MappedObject};
 use crate::sdo::Abort;
 
 /// An offset outside every image: a read gives zero, a write has no effect.
@@ -14,7 +14,7 @@ pub(crate) struct Located {
     pub(crate) takes_any: bool,
 }
 
-/// Finds the location of a mapped object.
+/// Finds the location of a mapped object. `is_stored` tells whether a write to it stores values at once.
 ///
 /// `NoObject` if there is no such object; `NotMappable` if the object cannot be mapped in this direction, or if the
 /// length is not the length of the object.
@@ -22,6 +22,7 @@ pub(crate) fn locate(
     dictionary: &Dictionary,
     mapped: MappedObject,
     direction: Direction,
+    is_stored: impl Fn(&Entry) -> bool,
 ) -> Result<Located, Abort> {
     let (located, fits) = match mapped.dummy_size() {
         Some(size) if direction == Direction::Receive => {
@@ -35,7 +36,7 @@ pub(crate) fn locate(
                 Direction::Receive => mapping.allows_rpdo(),
             };
             // A new value of a parameter must be reported to the application, so it does not skip the check.
-            let takes_any = entry.takes_any() && !entry.is_parameter();
+            let takes_any = entry.takes_any() && !entry.is_parameter() && !is_stored(&entry);
             (Located { field: entry.field, takes_any }, fits)
         }
     };

@@ -9,7 +9,7 @@ mod tpdo;
 
 pub use crate::dictionary::{Addressing, MappedObject, Transmission};
 pub(crate) use budget::{Budget, Choices, ProcessContext};
-pub(crate) use mapping::{Chain, Content, Layout, Links, locate};
+pub(crate) use mapping::{Chain, Content, Layout, Links, Located, locate};
 pub use multiplexed::{Address, Mpdo};
 pub(crate) use rpdo::{Reception, Rpdo, RpdoFault, RpdoSettings};
 pub(crate) use scanner::{Scanner, ScannerSettings, Watched};

@@ -249,3 +249,20 @@ fn a_job_that_fails_neither_begins_nor_ends_the_wait_of_a_restore() {
     run(&mut bench, SAVE, Err(Abort::Hardware));
     assert_eq!((bench.write(PRESET, 0, &[8]), value(&bench)), (Err(DEVICE_STATE), 7), "the restore waits");
 }
+
+/// 6200h has no limits, no handler and no group: its values are written to the image without a check.
+#[test]
+fn an_object_without_a_check_is_stored_at_once_by_an_rpdo_too() {
+    for (stored, expected) in [(0x6200, Some(Job::Store(APPLICATION))), (0x5F00, None)] {
+        let mut bench = prepared(Bench::operational());
+        bench.device.application_mut().stored_at_once = stored;
+        bench.write(0x1600, 0, &[0]).unwrap();
+        bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+        bench.write(0x1600, 0, &[1]).unwrap();
+        bench.write32(0x1400, 1, RPDO.into()).unwrap();
+        while bench.take_action().is_some() {}
+        bench.receive(Frame::new(RPDO, &[9, 0]).unwrap());
+        assert_eq!(job(&mut bench), expected);
+        assert_eq!(DICTIONARY.field(0x6200, 0).u16(bench.device.image()), 9);
+    }
+}
