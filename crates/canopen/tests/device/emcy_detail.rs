@@ -23,7 +23,11 @@ struct Channels {
 }
 
 impl Application for Channels {
-    const CONDITIONS: &'static [Condition] = &[Condition::new(0x2310), Condition::new(0x5000)];
+    const CONDITIONS: &'static [Condition] = &[
+        Condition::new(0x2310),
+        Condition::new(0x5000),
+        Condition { register: 0b1001, ..Condition::new(0x4000) },
+    ];
     const LISTS_DETAIL: bool = true;
 
     fn fault_detail(&self, number: u8) -> Option<[u8; 5]> {
@@ -81,4 +85,13 @@ fn the_list_has_no_more_errors_than_1003h_has_entries() {
     }
     assert_eq!(listed(&mut node, 0), [4]);
     assert_eq!(listed(&mut node, 4), [0x10, 0x23, 3, 7]);
+}
+
+#[test]
+fn a_condition_may_name_the_generic_error() {
+    let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Channels { channel: 0, value: 0 });
+    let _ = node.start(Instant(0), &mut Sent::default());
+    let _ = node.set_condition(2, true, Instant(1));
+    assert_eq!(emcys(&mut node, Instant(2)), [[0x00, 0x40, 0b1001, 0, 0, 0, 0, 0]]);
+    assert_eq!(DICTIONARY.field(0x1001, 0).u8(node.image()), 0b1001);
 }
