@@ -264,3 +264,50 @@ fn a_frame_is_shown_with_its_identifier_its_kind_and_its_data() {
     assert_eq!(shown(Frame::new(0x123, &[1, 2])), "Frame { id: 291, remote: false, len: 2, data: [1, 2] }");
     assert_eq!(shown(Frame::remote(0x7FF, 8)), "Frame { id: 2047, remote: true, len: 8, data: [] }");
 }
+
+#[test]
+fn a_full_queue_is_shown_in_words() {
+    assert_eq!(canopen::QueueFull.to_string(), "the transmit queue is full");
+}
+
+#[test]
+fn an_lss_request_with_one_byte_is_parsed_and_a_reserved_mode_is_refused() {
+    let parse = |command, first| lss::Request::parse([command, first, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(parse(0x04, 0), Some(lss::Request::SwitchGlobal { configuration: false }));
+    assert_eq!(parse(0x04, 1), Some(lss::Request::SwitchGlobal { configuration: true }));
+    assert_eq!(parse(0x04, 2), None);
+    assert_eq!(parse(0x5E, 0), Some(lss::Request::InquireNodeId));
+}
+
+#[test]
+fn a_block_upload_has_a_crc_if_its_bit_is_set() {
+    let at = Multiplexer { index: 0x1008, sub: 2 };
+    for (command, crc) in [(0xA0, false), (0xA4, true)] {
+        let request = Request::BlockUpload { at, crc, block_size: 7, threshold: 9 };
+        assert_eq!(Request::parse(&[command, 0x08, 0x10, 2, 7, 9, 0, 0]), Some(request));
+    }
+}
+
+/// Bit 0 of a command says that there is a size, bit 1 that the data is in the frame.
+#[test]
+fn the_two_lowest_bits_of_a_command_say_what_the_four_data_bytes_are() {
+    let at = Multiplexer { index: 0x1008, sub: 2 };
+    let frame = |command| [command, 0x08, 0x10, 2, 1, 2, 3, 4];
+    let size = Some(0x0403_0201);
+    for (command, initiate) in [
+        (0x20, Initiate::Segmented(None)),
+        (0x21, Initiate::Segmented(size)),
+        (0x22, Initiate::Unsized([1, 2, 3, 4])),
+        (0x2B, Initiate::Expedited(Bytes::from_slice(&[1, 2]))),
+    ] {
+        assert_eq!(Request::parse(&frame(command)), Some(Request::Download(at, initiate)), "{command:X}h");
+    }
+    for (command, response) in [
+        (0x40, Response::UploadSegmented(at, None)),
+        (0x41, Response::UploadSegmented(at, size)),
+        (0x42, Response::Uploaded(at, Bytes::from_slice(&[1, 2, 3, 4]))),
+        (0x4B, Response::Uploaded(at, Bytes::from_slice(&[1, 2]))),
+    ] {
+        assert_eq!(Response::parse(frame(command)), Some(response), "{command:X}h");
+    }
+}

@@ -566,3 +566,105 @@ fn a_block_continues_one_millisecond_after_a_full_queue() {
     client.bench.run(Duration(1));
     assert_eq!(segments(&client.bench), 100);
 }
+
+/// The whole block has arrived before the reset, and the client sends the next one.
+#[test]
+fn the_block_after_a_complete_one_and_a_reset_is_no_request() {
+    for lost in [0, 5] {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+        for sequence in 1..=127 {
+            client.send_segment(middle(LIKE_REQUESTS, sequence));
+        }
+        client.bench.nmt(0x82);
+        client.bench.start();
+        client.bench.take();
+        assert_no_request(&mut client, 1 + lost, 0x0800_0022);
+    }
+}
+
+#[test]
+fn a_request_is_answered_a_tenth_of_a_second_after_the_last_segment_before_a_reset() {
+    for (pause, is_answered) in [(99_999, false), (100_000, true)] {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+        for sequence in 1..=0x3F {
+            client.send_segment(middle([0; 7], sequence));
+        }
+        client.bench.nmt(0x82);
+        client.bench.start();
+        client.bench.run(Duration(pause));
+        client.bench.take();
+        // The request looks like the next segment, 40h.
+        let answer = client.bench.ask(Request::Upload(Multiplexer { index: 0x1001, sub: 0 }));
+        assert_eq!(answer.is_some(), is_answered, "after {pause} us");
+    }
+}
+
+/// The client has sent its last segment, so no segment follows the time-out.
+#[test]
+fn a_request_after_a_time_out_at_the_end_of_a_download_is_answered() {
+    let mut client = Client::new();
+    let content = data(0x3F * 7);
+    client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+    for sequence in 1..=0x3F {
+        client.send_segment(segment(&content, usize::from(sequence) - 1, sequence));
+    }
+    client.bench.run(Duration::from_millis(1500));
+    assert_eq!(client.response(), Some(Response::Abort(DOMAIN, 0x0504_0000)));
+    assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]));
+}
+
+/// The caller has not polled in between.
+#[test]
+fn a_silence_of_a_second_within_a_block_ends_the_transfer() {
+    let acknowledge = Response::BlockAcknowledge(3, BlockSize::MAX);
+    for (silence, expected) in [(999_999, acknowledge), (1_000_000, Response::Abort(DOMAIN, 0x0504_0000))] {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+        for sequence in 1..=3 {
+            client.send_segment(middle([0; 7], sequence));
+        }
+        client.bench.now = client.bench.now + Duration(silence);
+        client.bench.poll();
+        assert_eq!(client.response(), Some(expected), "after {silence} us");
+    }
+}
+
+/// An upload of 35 bytes whose first block, of two segments, has been sent.
+fn begun_upload() -> Client {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(35);
+    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 2, threshold: 0 });
+    client.request(Request::BlockUploadStart);
+    assert_eq!(client.block().len(), 2);
+    client
+}
+
+#[test]
+fn a_repeated_acknowledge_of_a_larger_block_is_ignored() {
+    let mut client = begun_upload();
+    let acknowledge = Request::BlockAcknowledge { sequence: 2, block_size: 1 };
+    client.request(acknowledge);
+    assert_eq!(client.block().len(), 1);
+    client.request(acknowledge);
+    assert_eq!(client.block(), [[0; 8]; 0], "the block has one segment");
+    client.request(Request::BlockAcknowledge { sequence: 1, block_size: 2 });
+    assert_eq!(client.block().len(), 2);
+}
+
+#[test]
+fn a_begin_or_an_acknowledge_that_comes_again_later_ends_an_upload() {
+    let abort = Some(Response::Abort(DOMAIN, 0x0504_0001));
+    let mut client = begun_upload();
+    client.request(Request::BlockAcknowledge { sequence: 2, block_size: 2 });
+    assert_eq!(client.block().len(), 2);
+    assert_eq!(client.bench.ask(Request::BlockUploadStart), abort);
+
+    let mut client = begun_upload();
+    client.request(Request::BlockAcknowledge { sequence: 2, block_size: 3 });
+    assert_eq!(client.block().len(), 3);
+    let all = Request::BlockAcknowledge { sequence: 3, block_size: 3 };
+    assert_eq!(client.bench.ask(all), Some(Response::BlockUploadEnd(end(&data(35)))));
+    assert_eq!(client.bench.ask(Request::BlockAcknowledge { sequence: 2, block_size: 3 }), abort);
+}

@@ -52,6 +52,8 @@ struct Tape {
     broken: Option<usize>,
     refuses_end: bool,
     is_empty: bool,
+    /// The parts of downloads: offset and length.
+    parts: Vec<(usize, usize)>,
 }
 
 impl Application for Tape {
@@ -88,7 +90,7 @@ impl Application for Tape {
             Part::Data(offset, _) if self.broken == Some(offset) => return Err(Abort::Hardware),
             Part::End(_) if self.refuses_end => return Err(Abort::DeviceState),
             Part::End(len) => self.calls.push(Call::Downloaded(len)),
-            Part::Data(..) => (),
+            Part::Data(offset, bytes) => self.parts.push((offset, bytes.len())),
         }
         Ok(())
     }
@@ -391,4 +393,30 @@ fn a_domain_that_the_application_does_not_serve_is_refused() {
     assert_eq!(of(slice), (Ok(b"a slice".to_vec()), Err(refused)));
     assert_eq!(of(length), (Err(refused), Err(refused)));
     assert_eq!(of(nothing), (Err(refused), Err(refused)));
+}
+
+#[test]
+fn a_domain_without_a_length_is_one_slice_in_blocks_too() {
+    let mut node = node(9);
+    assert_eq!(block_upload_of(&mut node, WHOLE, |_| false).unwrap(), b"a domain as one slice");
+    let name = Multiplexer { index: 0x1018, sub: 2 };
+    assert_eq!(block_upload_of(&mut node, name, |_| false).unwrap(), [1, 0, 0, 0]);
+    assert_eq!(calls(&mut node), []);
+}
+
+/// The server acknowledges a block after a pause, and its buffer keeps the data.
+#[test]
+fn a_pause_within_a_block_does_not_divide_a_part() {
+    for segments in [3, 15] {
+        let (mut node, mut sent) = (node(0), Sent::default());
+        ask(&mut node, Request::BlockDownload { at: LOG, crc: false, size: None });
+        for (block, now, segments) in [(1, 1, 1..=segments), (2, 300_001, 1..=17)] {
+            let _ = node.poll(Instant(now), &mut sent);
+            for sequence in segments {
+                let segment = Frame::new(0x605, &[sequence, block, 2, 3, 4, 5, 6, 7]).unwrap();
+                let _ = node.on_service_frame(&segment, Instant(now), &mut sent);
+            }
+        }
+        assert_eq!(node.application().parts, [(0, 112)], "{segments} segments before the pause");
+    }
 }

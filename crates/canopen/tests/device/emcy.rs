@@ -234,3 +234,25 @@ fn the_quiet_time_of_lost_frames_ends_in_every_nmt_state() {
     bench.run(Duration::from_millis(1));
     assert_eq!(codes(&mut bench), [0x8110, 0x8110, 0], "the reset reports the active faults again");
 }
+
+#[test]
+fn an_active_fault_of_the_bus_is_reported_again_after_a_reset() {
+    let mut bench = Bench::booted();
+    bench.bus(BusEvent::Passive);
+    bench.nmt(0x82);
+    bench.take();
+    bench.start();
+    assert_eq!(bench.sent(), [(0x705, vec![0]), emcy(0x8120, 0x11)]);
+}
+
+#[test]
+fn every_one_of_many_faults_is_reported() {
+    let mut bench = Bench::booted();
+    for _ in 0..20 {
+        bench.raise(SENSOR_BREAK);
+        bench.poll();
+        bench.clear(SENSOR_BREAK);
+        bench.poll();
+        assert_eq!(bench.sent(), [emcy(0x5006, 1), emcy(0, 0)]);
+    }
+}

@@ -23,7 +23,11 @@ struct Channels {
 }
 
 impl Application for Channels {
-    const CONDITIONS: &'static [Condition] = &[Condition::new(0x2310), Condition::new(0x5000)];
+    const CONDITIONS: &'static [Condition] = &[
+        Condition::new(0x2310),
+        Condition::new(0x5000),
+        Condition { register: 0b1001, ..Condition::new(0x4000) },
+    ];
     const LISTS_DETAIL: bool = true;
 
     fn fault_detail(&self, number: u8) -> Option<[u8; 5]> {
@@ -100,4 +104,13 @@ fn an_emcy_has_the_error_field_of_its_condition_by_default() {
     let _ = node.set_condition(0, true, Instant(1));
     let _ = node.poll(Instant(1), &mut sent);
     assert_eq!(sent.0, [Frame::new(0x085, &[0x10, 0x23, 1, 1, 2, 3, 4, 5]).unwrap()]);
+}
+
+#[test]
+fn a_condition_may_name_the_generic_error() {
+    let mut node: Node = Device::new(&DICTIONARY, NodeId::new(ID), Channels { channel: 0, value: 0 });
+    let _ = node.start(Instant(0), &mut Sent::default());
+    let _ = node.set_condition(2, true, Instant(1));
+    assert_eq!(emcys(&mut node, Instant(2)), [[0x00, 0x40, 0b1001, 0, 0, 0, 0, 0]]);
+    assert_eq!(DICTIONARY.field(0x1001, 0).u8(node.image()), 0b1001);
 }

@@ -196,3 +196,19 @@ fn an_answer_dropped_in_a_full_queue_leaves_the_toggle_bit() {
     assert_eq!(guard(&mut node, 0x705, 4), [[0xFF]]);
     assert_eq!(guard(&mut node, 0x705, 5), [[0x7F]]);
 }
+
+#[test]
+fn a_missing_master_is_reported_again_when_emcy_is_switched_on() {
+    let mut node = node();
+    write(&mut node, (0x100C, 0), &[100, 0]);
+    write(&mut node, (0x100D, 0), &[3]);
+    write(&mut node, (0x1014, 0), &0x8000_0085_u32.to_le_bytes());
+    guard(&mut node, 0x705, 2);
+    let mut sent = Sent::default();
+    let _ = node.poll(Instant(300_002), &mut sent);
+    assert_eq!((sent.0.len(), &node.application().faults[..]), (0, &[(Fault::LifeGuard, true)][..]));
+    let switch_on = Frame::new(0x605, &[0x23, 0x14, 0x10, 0, 0x85, 0, 0, 0]).unwrap();
+    let _ = node.on_service_frame(&switch_on, Instant(300_003), &mut sent);
+    let emcys: Vec<_> = sent.0.iter().filter(|frame| frame.id() == 0x085).map(Frame::data).collect();
+    assert_eq!(emcys, [[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]]);
+}

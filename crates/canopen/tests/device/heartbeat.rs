@@ -147,3 +147,28 @@ fn a_stored_node_is_watched_after_a_reset_and_a_restored_one_is_not() {
         assert_eq!(emergencies(&mut bench), expected);
     }
 }
+
+#[test]
+fn a_poll_after_whole_periods_sends_one_heartbeat() {
+    for periods in 2..=4 {
+        let mut bench = Bench::booted();
+        bench.now = bench.now + Duration(periods * 1_000_000);
+        assert_eq!(bench.times_of(0x705, Duration(999_999)), [0], "after {periods} periods");
+        assert_eq!(bench.times_of(0x705, Duration(1)), [1]);
+    }
+}
+
+#[test]
+fn a_reset_of_the_communication_ends_a_watch_that_is_not_stored() {
+    for sub in 1..=4 {
+        let mut bench = Bench::booted();
+        bench.write32(0x1016, sub, 0x0009_0064).unwrap();
+        beat(&mut bench, 9);
+        bench.nmt(0x82);
+        bench.start();
+        assert!(!bench.device.service_ids().any(|id| id.get() == 0x709), "1016h:{sub}");
+        beat(&mut bench, 9);
+        bench.run(Duration::from_millis(500));
+        assert_eq!(emergencies(&mut bench), [], "1016h:{sub}");
+    }
+}

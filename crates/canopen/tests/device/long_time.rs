@@ -1,8 +1,10 @@
 //! Times beyond 32 bits of microseconds: no deadline of a device is early, late or in the past.
 
 use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
-use canopen::{Application, BusEvent, Device, Fault, Frame, Instant, NodeId, objects};
+use canopen::sdo::{Initiate, Multiplexer, Request};
+use canopen::{Application, BusEvent, Device, Duration, Fault, Frame, Instant, NodeId, objects};
 
+use crate::bench::Bench;
 use crate::exchange;
 use crate::types::Sent;
 
@@ -132,5 +134,27 @@ fn the_inhibit_time_of_an_emcy_ends_in_time_for_hours() {
             [pause, pause + 6 * SECOND],
             "{pause}"
         );
+    }
+}
+
+#[test]
+fn a_silent_node_and_a_silent_client_are_noticed_in_time_at_any_instant() {
+    let mut bench = Bench::booted();
+    let at = Multiplexer { index: 0x6103, sub: 0 };
+    bench.write32(0x1016, 1, 0x0009_03E8).unwrap();
+    // EMCYs and abort messages: an error code, and the command.
+    let reports = |bench: &mut Bench| -> Vec<(u16, u8)> {
+        let mut sent = bench.sent();
+        sent.retain(|(id, _)| [0x085, 0x585].contains(id));
+        sent.into_iter().map(|(id, data)| (id, data[0])).collect()
+    };
+    for second in 0..100 {
+        bench.receive(Frame::new(0x709, &[5]).unwrap());
+        assert!(bench.ask(Request::Download(at, Initiate::Segmented(None))).is_some());
+        reports(&mut bench);
+        bench.run(Duration(999_999));
+        assert_eq!(reports(&mut bench), [], "from {second} s on");
+        bench.run(Duration(1));
+        assert_eq!(reports(&mut bench), [(0x085, 0x30), (0x585, 0x80)], "from {second} s on");
     }
 }

@@ -313,3 +313,47 @@ fn a_detected_bit_rate_is_stored_with_a_node_id() {
     let configuration = Configuration { node_id: NodeId::new(7), bit_rate };
     assert_eq!(bench.take_action(), Some(Action::Store(Job::Configure(configuration))));
 }
+
+#[test]
+fn a_configured_device_does_not_boot_when_the_master_is_done() {
+    let mut bench = Bench::booted();
+    while bench.take_action().is_some() {}
+    for id in [None, Some(9)] {
+        configuration(&mut bench, true);
+        if let Some(id) = id {
+            assert_eq!(send(&mut bench, Request::NodeId(id)), Some(Response::NodeId(0)));
+        }
+        configuration(&mut bench, false);
+        assert_eq!((bench.take_action(), bench.device.state()), (None, State::PreOperational), "{id:?}");
+    }
+}
+
+#[test]
+fn a_new_node_id_is_not_used_before_the_master_is_done() {
+    let mut bench = Bench::unconfigured();
+    while bench.take_action().is_some() {}
+    configuration(&mut bench, true);
+    assert_eq!(send(&mut bench, Request::NodeId(9)), Some(Response::NodeId(0)));
+    configuration(&mut bench, true);
+    assert_eq!(bench.take_action(), None);
+    assert_eq!(send(&mut bench, Request::InquireNodeId), Some(Response::NodeIdIs(255)));
+}
+
+#[test]
+fn a_device_is_unconfigured_without_any_node_id_now_and_after_a_reset() {
+    for (mut bench, id) in [(Bench::booted(), 255), (Bench::unconfigured(), 9)] {
+        configuration(&mut bench, true);
+        assert_eq!(send(&mut bench, Request::NodeId(id)), Some(Response::NodeId(0)));
+        assert_eq!(send(&mut bench, Request::IdentifyUnconfigured), None, "node-ID {id}");
+    }
+}
+
+#[test]
+fn a_fastscan_with_a_part_out_of_range_has_no_answer() {
+    let mut bench = Bench::unconfigured();
+    let confirm = |part, next| Request::Fastscan { value: 0, bit: Request::CONFIRM, part, next };
+    for (part, next) in [(4, 0), (0, 4), (4, 4)] {
+        assert_eq!(send(&mut bench, confirm(part, next)), None, "part {part}, next {next}");
+    }
+    assert_eq!(send(&mut bench, confirm(3, 3)), Some(Response::Identified));
+}

@@ -6,7 +6,10 @@ use crate::types::Sent;
 use canopen::dictionary::{Access, Dictionary, Group, Groups, Object, Type};
 use canopen::lss::{BitRate, Request};
 use canopen::nmt::State;
-use canopen::{Action, BusEvent, Device, Duration, ErrorClass, Frame, Instant, Job, NodeId, objects};
+use canopen::{
+    Action, Application, BusEvent, Condition, Device, Duration, ErrorClass, Frame, Instant, Job, NodeId,
+    objects,
+};
 
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -548,4 +551,44 @@ fn a_start_carries_out_a_reset_that_has_not_been_handed_over() {
     let next = bench.device.start(bench.now, &mut bench.out);
     assert_eq!(next.action, Some(Action::Identifiers));
     assert_eq!(actions(&mut bench), []);
+}
+
+/// Counts the calls for errors, by their class.
+#[derive(Default)]
+struct Errors(Vec<u8>);
+
+impl Application for Errors {
+    const CONDITIONS: &'static [Condition] =
+        &[Condition::new(0x5000), Condition::new(0x5001).of_class(ErrorClass::DEVICE)];
+
+    fn error(&mut self, ErrorClass(class): ErrorClass, _: &mut [u8]) {
+        self.0.push(class);
+    }
+}
+
+#[test]
+fn a_device_without_emcy_reacts_to_an_error_once_and_after_each_reset() {
+    const ROWS: &[Object] = canopen::rows!(
+        [objects::device_type(0), objects::error_register()],
+        objects::error_behaviour(2),
+        objects::identity(0, 1, 1),
+    );
+    static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+    let mut sent = Sent::default();
+    let mut node: canopen::device!(Errors, ROWS) =
+        Device::new(&DICTIONARY, NodeId::new(ID), Errors::default());
+    let _ = node.start(Instant(0), &mut sent);
+    let _ = node.on_frame(&Frame::new(0, &[START, ID]).unwrap(), Instant(1), &mut sent);
+    for (condition, classes, state) in [(0, &[][..], State::Operational), (1, &[2], State::Stopped)] {
+        for now in [2, 3] {
+            let _ = node.set_condition(condition, true, Instant(now));
+            let _ = node.poll(Instant(now), &mut sent);
+        }
+        assert_eq!((&node.application().0[..], node.state()), (classes, state), "condition {condition}");
+    }
+    let _ = node.on_frame(&Frame::new(0, &[RESET_COMMUNICATION, ID]).unwrap(), Instant(4), &mut sent);
+    let _ = node.start(Instant(5), &mut sent);
+    let _ = node.poll(Instant(6), &mut sent);
+    assert_eq!((&node.application().0[..], node.state()), (&[2, 2][..], State::Stopped));
+    assert!(sent.0.iter().all(|frame| frame.id() == 0x705));
 }

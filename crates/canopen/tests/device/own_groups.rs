@@ -184,3 +184,14 @@ fn a_reset_of_the_communication_leaves_a_low_index_of_another_group_alone() {
     start(&mut node);
     assert_eq!(read(&mut node, 0x1009, 0), Ok(vec![0; 4]));
 }
+
+#[test]
+fn a_group_that_stays_damaged_is_no_new_fault_at_a_reset() {
+    let mut node = node();
+    node.application_mut().damaged = Some(Group::Own4);
+    for _ in 0..3 {
+        let _ = node.nmt(Command::ResetNode, Instant(3), &mut Sent::default());
+        start(&mut node);
+        assert_eq!(node.application().faults, [(Fault::StoredData(Group::Own4), true)]);
+    }
+}

@@ -254,3 +254,22 @@ fn publish_sends_changes_of_a_hook() {
         sent.0.iter().filter(|frame| frame.id() == 0x185).map(|frame| frame.data()[0]).collect();
     assert_eq!(values.last(), Some(&5), "{values:?}");
 }
+
+#[test]
+fn a_late_sync_does_not_shift_the_following_ones() {
+    let mut node = node();
+    assert_eq!(run(&mut node, (1, 5000), &[0x80]).len(), 1);
+    let times: Vec<u64> = run(&mut node, (12_000, 35_000), &[0x80]).iter().map(|(now, ..)| *now).collect();
+    assert_eq!(times, [12_000, 20_001, 30_001]);
+}
+
+#[test]
+fn the_producer_keeps_its_period_for_minutes() {
+    const SECOND: u64 = 1_000_000;
+    let mut node = node();
+    write(&mut node, 0x1006, &1_000_000_u32.to_le_bytes(), 1).unwrap();
+    let syncs = run(&mut node, (1, 200 * SECOND), &[0x80]);
+    let times: Vec<u64> = syncs.iter().map(|(now, ..)| *now).collect();
+    assert!(times.windows(2).all(|pair| pair[1] - pair[0] == SECOND), "{times:?}");
+    assert_eq!(times.len(), 200);
+}
