@@ -264,3 +264,18 @@ fn a_frame_is_shown_with_its_identifier_its_kind_and_its_data() {
     assert_eq!(shown(Frame::new(0x123, &[1, 2])), "Frame { id: 291, remote: false, len: 2, data: [1, 2] }");
     assert_eq!(shown(Frame::remote(0x7FF, 8)), "Frame { id: 2047, remote: true, len: 8, data: [] }");
 }
+
+#[test]
+fn a_remote_frame_has_a_can_id_and_at_most_eight_bytes() {
+    for (id, len, is_valid) in [
+        (0, 0, true),
+        (0x7FF, 8, true),
+        (0x800, 0, false),
+        (0x800, 8, false),
+        (0x7FF, 9, false),
+        (0, 9, false),
+    ] {
+        let frame = Frame::remote(id, len).map(|frame| (frame.id(), frame.len(), frame.is_remote()));
+        assert_eq!(frame, is_valid.then_some((id, len.into(), true)), "{id:X}h, {len}");
+    }
+}

@@ -157,3 +157,14 @@ fn a_remote_frame_is_no_data() {
     bench.receive(Frame::remote(RPDO1, 2).unwrap());
     assert_eq!((value(&mut bench), bench.take()), (vec![0, 0], vec![]));
 }
+
+#[test]
+fn a_deadline_keeps_its_length_for_minutes() {
+    let mut bench = bench();
+    bench.write(0x1400, 5, &20_000_u16.to_le_bytes()).unwrap();
+    for _ in 0..8 {
+        send(&mut bench, RPDO1, &[1, 2]);
+        bench.take();
+        assert_eq!(bench.times_of(0x085, Duration::from_millis(21_000)), [20_000_000]);
+    }
+}

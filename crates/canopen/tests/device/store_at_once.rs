@@ -231,3 +231,16 @@ fn a_restore_is_ended_by_a_save_and_by_the_reset_only() {
         }
     }
 }
+
+#[test]
+fn a_second_restore_of_the_same_group_waits_for_the_reset_too() {
+    for (first, second) in [(3, 3), (1, 3), (3, 1)] {
+        let mut bench = booted();
+        for sub in [first, second] {
+            request(&mut bench, [0x23, 0x11, 0x10, sub, b'l', b'o', b'a', b'd']);
+            assert!(matches!(job(&mut bench), Some(Job::Restore(_))));
+            assert_eq!(finish(&mut bench, Ok(())).len(), 1);
+            assert_eq!(bench.write(PRESET, 0, &[7]), Err(DEVICE_STATE), "1011h:{first}, 1011h:{second}");
+        }
+    }
+}
