@@ -357,12 +357,11 @@ fn a_full_queue_after_the_inhibit_time_is_tried_again_each_millisecond() {
     assert_eq!(sent(&mut bench), [[1, 0, 0, 0]]);
 }
 
-/// The CAN-ID, the rate and the credit of the bus outlast the time after which the clock of a device starts over.
+/// The ticks of a device count from an epoch, which moves 2^25 us after the last one.
 #[test]
-fn the_bus_share_counts_the_time_of_a_long_pause_of_the_clock() {
+fn the_bus_share_counts_the_time_across_a_move_of_the_epoch() {
     let mut bench = bench(255, 0, 0);
     bench.device.set_bus_bit_rate(BitRate::from_kbit(10).unwrap());
-    // The clock starts over after 2^25 us.
     let limit = 1 << 25;
     bench.run(Duration(limit - 10_000 - bench.now.0));
     bench.take();
