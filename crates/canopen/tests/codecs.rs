@@ -311,3 +311,17 @@ fn the_two_lowest_bits_of_a_command_say_what_the_four_data_bytes_are() {
         assert_eq!(Response::parse(frame(command)), Some(response), "{command:X}h");
     }
 }
+
+fn a_remote_frame_has_a_can_id_and_at_most_eight_bytes() {
+    for (id, len, is_valid) in [
+        (0, 0, true),
+        (0x7FF, 8, true),
+        (0x800, 0, false),
+        (0x800, 8, false),
+        (0x7FF, 9, false),
+        (0, 9, false),
+    ] {
+        let frame = Frame::remote(id, len).map(|frame| (frame.id(), frame.len(), frame.is_remote()));
+        assert_eq!(frame, is_valid.then_some((id, len.into(), true)), "{id:X}h, {len}");
+    }
+}

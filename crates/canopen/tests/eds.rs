@@ -176,3 +176,13 @@ fn keys_without_a_row_are_the_vendors() {
     assert!(!section("FileInfo").iter().any(|line| line.contains("Date")), "no date, no entry");
     assert!(section("DeviceInfo").contains(&"BaudRate_1000=1".to_owned()));
 }
+
+/// A multiplexed PDO maps nothing: sub-index 0 is the only entry of its mapping parameter.
+#[test]
+fn a_mapping_parameter_of_one_entry_is_a_record() {
+    let mapping = Object::new(0x1A01, 0, "Mapping", Type::Unsigned8, Access::Const).value(0xFF);
+    let mut sheet = String::new();
+    write(&[mapping], &DeviceInfo::new("Example", "I/O module"), &mut sheet).unwrap();
+    let expected = "[1A01]\r\nParameterName=Mapping\r\nObjectType=0x9\r\nSubNumber=1\r\n\r\n[1A01sub0]\r\n";
+    assert!(sheet.contains(expected), "{sheet}");
+}

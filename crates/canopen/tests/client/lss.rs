@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use canopen::client::lss::{self, Error, Fastscan, Name, Options};
-use canopen::client::{Service, Step};
+use canopen::client::{Service, Step, Taken};
 use canopen::lss::{Identity, Part, Request, Response};
 use canopen::{Duration, Frame, Instant, NodeId};
 
@@ -148,4 +148,44 @@ fn a_slave_is_selected_by_its_identity() {
     assert_eq!(run(lss::select(&seven, OPTIONS), &mut slaves), Ok(()));
     assert_eq!(slaves.selected, Some(seven));
     assert_eq!(run(lss::select(&eight, OPTIONS), &mut slaves), Err(Error::NoAnswer(Name::Select)));
+}
+
+#[test]
+fn a_second_answer_changes_nothing() {
+    let mut exchange = lss::inquire(Part::Vendor, OPTIONS);
+    let frame = |value| Frame::new(0x7E4, &Response::Identity(Part::Vendor, value).encode()).unwrap();
+    assert_eq!(exchange.on_frame(&frame(1), Instant(0)), Taken::Ignored, "before the request");
+    assert!(matches!(exchange.next(Instant(0)), Step::Send(_)));
+    assert_eq!(exchange.on_frame(&frame(2), Instant(1)), Taken::Used);
+    assert_eq!(exchange.on_frame(&frame(3), Instant(2)), Taken::Ignored);
+    assert_eq!(exchange.next(Instant(3)), Step::Done(Ok(2)));
+}
+
+/// Slaves that a former master has selected may answer late.
+#[test]
+fn an_answer_before_the_last_part_of_an_identity_selects_nothing() {
+    let selected = Frame::new(0x7E4, &Response::Selected.encode()).unwrap();
+    let identity = Identity { vendor: 0x319, product: 2, revision: 0x1_0000, serial: 7 };
+    let mut exchange = lss::select(&identity, OPTIONS);
+    for part in Part::ALL {
+        assert_eq!(exchange.on_frame(&selected, Instant(0)), Taken::Ignored, "{part:?}");
+        assert!(matches!(exchange.next(Instant(0)), Step::Send(_)), "{part:?}");
+    }
+    assert_eq!(exchange.on_frame(&selected, Instant(0)), Taken::Used);
+}
+
+#[test]
+fn fastscan_takes_no_other_frame_for_an_answer() {
+    let other = [Response::Unconfigured, Response::Selected, Response::NodeIdIs(5)];
+    let mut frames = other.map(|response| Frame::new(0x7E4, &response.encode()).unwrap()).to_vec();
+    let identified = Frame::new(0x7E4, &Response::Identified.encode()).unwrap();
+    frames.push(Frame::new(0x185, identified.data()).unwrap());
+    let mut scan = Fastscan::new(Options { retries: 0, ..OPTIONS });
+    assert_eq!(scan.on_frame(&identified, Instant(0)), Taken::Ignored, "before the first question");
+    assert!(matches!(scan.next(Instant(0)), Step::Send(_)));
+    for frame in frames {
+        assert_eq!(scan.on_frame(&frame, Instant(1)), Taken::Ignored, "{frame:?}");
+    }
+    assert_eq!(scan.next(Instant(1)), Step::Wait(Instant(10_000)));
+    assert_eq!(scan.next(Instant(10_000)), Step::Done(Ok(None)), "no slave");
 }

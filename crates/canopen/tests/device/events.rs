@@ -208,3 +208,51 @@ fn a_call_before_the_deadline_asks_for_no_event() {
     publish(&mut bench);
     assert_eq!(told(&mut bench), [7]);
 }
+
+#[test]
+fn an_event_outlasts_the_synchronous_window() {
+    for transmission in [0, 1] {
+        let mut bench = operational(transmission, 0, 0);
+        bench.write32(0x1007, 0, 500).unwrap();
+        bench.sync();
+        bench.take();
+        bench.device.application_mut().events.push_back([1, 0, 0, 0]);
+        bench.out.room = 0;
+        bench.sync();
+        bench.run(Duration::from_millis(20));
+        bench.out.room = usize::MAX;
+        bench.run(MS);
+        assert_eq!(told(&mut bench), [1], "type {transmission}");
+    }
+}
+
+#[test]
+fn a_sync_asks_for_no_event_of_an_event_driven_type() {
+    for transmission in [254, 255] {
+        let mut bench = operational(transmission, 2000, 0);
+        push(&mut bench, [1, 2]);
+        assert_eq!(told(&mut bench), [1]);
+        bench.sync();
+        assert_eq!(told(&mut bench), [0; 0], "type {transmission}: the inhibit time");
+        bench.run(Duration::from_millis(200));
+        assert_eq!(told(&mut bench), [2], "type {transmission}");
+    }
+}
+
+#[test]
+fn a_sync_asks_for_no_event_while_another_one_waits_for_room() {
+    for transmission in [0, 1] {
+        let mut bench = operational(transmission, 0, 0);
+        bench.sync();
+        bench.take();
+        bench.device.application_mut().events.extend([[1, 0, 0, 0], [2, 0, 0, 0]]);
+        bench.out.room = 0;
+        bench.sync();
+        bench.sync();
+        assert_eq!(bench.device.application().events.len(), 1, "type {transmission}");
+        bench.out.room = usize::MAX;
+        bench.run(MS);
+        bench.sync();
+        assert_eq!(told(&mut bench), [1, 2], "type {transmission}");
+    }
+}

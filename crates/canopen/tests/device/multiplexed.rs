@@ -380,6 +380,49 @@ fn a_frame_that_is_no_multiplexed_pdo_is_no_error_of_the_rpdo_for_all_nodes() {
 }
 
 #[test]
+fn leaving_operational_ends_the_event_timer() {
+    let mut bench = sender(DESTINATION);
+    bench.write(0x1800, 5, &[20, 0]).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 3);
+    for command in [0x80, 2] {
+        bench.nmt(command);
+        assert_eq!(bench.times_of(TPDO, Duration::from_millis(100)), [], "{command:X}h");
+    }
+    bench.nmt(1);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(30)), [0, 0, 0, 20_000, 20_000, 20_000]);
+}
+
+#[test]
+fn leaving_operational_discards_what_waits_for_the_inhibit_time() {
+    let mut bench = sender(DESTINATION);
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 3, &[50, 0]).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 1, "two wait");
+    bench.nmt(0x80);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(100)), []);
+}
+
+#[test]
+fn a_reset_ends_the_inhibit_time() {
+    let mut bench = Bench::booted();
+    for command in [0x81, 0x82] {
+        bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+        bench.write(0x1800, 3, &50_000_u16.to_le_bytes()).unwrap();
+        bench.write(0x1800, 5, &[0, 0]).unwrap();
+        bench.write(0x1A00, 0, &[DESTINATION]).unwrap();
+        bench.write32(0x1800, 1, TPDO.into()).unwrap();
+        bench.nmt(1);
+        assert_eq!(mpdos(&mut bench).len(), 1, "before {command:X}h");
+        bench.nmt(command);
+        bench.start();
+        bench.run(Duration::from_millis(1));
+    }
+}
+
+#[test]
 fn an_rpdo_takes_the_frames_of_all_nodes_only_if_it_is_multiplexed_and_the_application_says_so() {
     for (all_nodes_rpdo, count) in [(0, DESTINATION), (1, 1)] {
         let mut bench = Bench::operational();
@@ -401,4 +444,30 @@ fn the_identifiers_are_those_of_the_own_frames_and_then_of_each_of_127_nodes() {
     let ids = bench.device.process_ids().map(canopen::CanId::get);
     let expected = [0x000, 0x080, RPDO, 0x185].into_iter().chain(0x201..=0x27F);
     assert!(ids.eq(expected), "{:03X?}", bench.device.process_ids().collect::<Vec<_>>());
+}
+
+fn the_event_timer_and_the_inhibit_time_keep_their_length_for_minutes() {
+    let mut bench = sender(DESTINATION);
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 3, &30_000_u16.to_le_bytes()).unwrap();
+    bench.write(0x1800, 5, &20_000_u16.to_le_bytes()).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.nmt(1);
+    let times = bench.times_of(TPDO, Duration::from_millis(130_000));
+    let expected = (0..=6).flat_map(|round| [0, 3, 6].map(|after| (round * 20 + after) * 1_000_000));
+    assert_eq!(times, expected.collect::<Vec<u64>>());
+}
+
+#[test]
+fn an_rpdo_of_mapped_objects_takes_no_frames_of_other_nodes() {
+    let mut bench = Bench::operational();
+    bench.device.application_mut().all_nodes_rpdo = 1;
+    bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+    bench.write(0x1600, 0, &[1]).unwrap();
+    bench.write32(0x1400, 1, RPDO.into()).unwrap();
+    bench.receive(Frame::new(0x210, &[0x80, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap());
+    assert_eq!(value(&bench), 0);
+    let ids: Vec<u16> = bench.device.process_ids().map(canopen::CanId::get).collect();
+    assert!(ids.contains(&RPDO) && !ids.contains(&0x210), "{ids:03X?}");
+    assert!(bench.device.process_filters().all(|(_, mask)| mask == 0x7FF));
 }

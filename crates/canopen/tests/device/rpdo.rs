@@ -185,3 +185,13 @@ fn a_value_for_the_application_may_change_parameters_and_another_one_does_not() 
         assert_eq!(bench.take_parameters(), is_reported, "{mapped:X}h");
     }
 }
+
+fn a_deadline_keeps_its_length_for_minutes() {
+    let mut bench = bench();
+    bench.write(0x1400, 5, &20_000_u16.to_le_bytes()).unwrap();
+    for _ in 0..8 {
+        send(&mut bench, RPDO1, &[1, 2]);
+        bench.take();
+        assert_eq!(bench.times_of(0x085, Duration::from_millis(21_000)), [20_000_000]);
+    }
+}

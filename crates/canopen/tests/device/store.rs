@@ -379,3 +379,15 @@ fn the_soundness_of_each_group_is_kept_apart() {
         }
     }
 }
+
+fn a_buffer_that_is_too_small_is_an_error_that_says_so() {
+    let bench = Bench::booted();
+    let whole = packed(&bench, Group::Application).len();
+    for len in [0, 4, 5, whole - 1, whole] {
+        let result =
+            DICTIONARY.pack(Group::Application, NodeId::new(ID), bench.device.image(), &mut vec![0; len]);
+        let message = result.map_err(|error| error.to_string());
+        let expected = "the buffer has no room for all values of the group".to_owned();
+        assert_eq!(message, if len == whole { Ok(whole) } else { Err(expected) }, "{len} bytes");
+    }
+}

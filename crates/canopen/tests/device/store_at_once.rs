@@ -266,3 +266,16 @@ fn an_object_without_a_check_is_stored_at_once_by_an_rpdo_too() {
         assert_eq!(DICTIONARY.field(0x6200, 0).u16(bench.device.image()), 9);
     }
 }
+
+#[test]
+fn a_second_restore_of_the_same_group_waits_for_the_reset_too() {
+    for (first, second) in [(3, 3), (1, 3), (3, 1)] {
+        let mut bench = booted();
+        for sub in [first, second] {
+            request(&mut bench, [0x23, 0x11, 0x10, sub, b'l', b'o', b'a', b'd']);
+            assert!(matches!(job(&mut bench), Some(Job::Restore(_))));
+            assert_eq!(finish(&mut bench, Ok(())).len(), 1);
+            assert_eq!(bench.write(PRESET, 0, &[7]), Err(DEVICE_STATE), "1011h:{first}, 1011h:{second}");
+        }
+    }
+}

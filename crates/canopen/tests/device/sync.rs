@@ -212,3 +212,19 @@ fn a_long_period_is_monitored_for_one_and_a_half_periods() {
         assert_eq!(emergencies(&mut bench), [0]);
     }
 }
+
+/// The window is one of the synchronous types.
+#[test]
+fn after_the_window_an_event_driven_pdo_still_waits_for_its_inhibit_time() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0185).unwrap();
+    bench.write(0x1800, 3, &1000_u16.to_le_bytes()).unwrap();
+    bench.write(0x1800, 5, &[0, 0]).unwrap();
+    bench.write32(0x1800, 1, 0x0000_0185).unwrap();
+    bench.write32(0x1007, 0, 2000).unwrap();
+    bench.nmt(1);
+    assert_eq!(bench.take().len(), 1);
+    bench.sync();
+    bench.set_value(1, &[1, 0, 0, 0]);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(200)), [100_000]);
+}

@@ -339,3 +339,38 @@ fn the_inhibit_time_delays_no_answer_of_type_253() {
         assert_eq!(sent(&mut bench).len(), 1);
     }
 }
+
+#[test]
+fn a_full_queue_after_the_inhibit_time_is_tried_again_each_millisecond() {
+    let mut bench = bench(255, 50, 0);
+    bench.run(Duration::from_millis(100));
+    bench.take();
+    bench.out.room = 0;
+    bench.set_value(1, &[1, 0, 0, 0]);
+    for _ in 0..3 {
+        let due = bench.poll();
+        assert_eq!(due, bench.now + MS);
+        bench.now = due;
+    }
+    bench.out.room = 10;
+    bench.poll();
+    assert_eq!(sent(&mut bench), [[1, 0, 0, 0]]);
+}
+
+/// The ticks of a device count from an epoch, which moves 2^25 us after the last one.
+#[test]
+fn the_bus_share_counts_the_time_across_a_move_of_the_epoch() {
+    let mut bench = bench(255, 0, 0);
+    bench.device.set_bus_bit_rate(BitRate::from_kbit(10).unwrap());
+    let limit = 1 << 25;
+    bench.run(Duration(limit - 10_000 - bench.now.0));
+    bench.take();
+    let burst = (1..100).take_while(|&number| {
+        bench.set_value(1, &[number, 0, 0, 0]);
+        !sent(&mut bench).is_empty()
+    });
+    assert_eq!(burst.count(), 2, "the rest waits for its share");
+    bench.now.0 = limit + 50_000;
+    bench.poll();
+    assert_eq!(sent(&mut bench), [[3, 0, 0, 0]], "after 60 ms, the share is full");
+}

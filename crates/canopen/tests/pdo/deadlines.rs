@@ -191,3 +191,19 @@ fn a_queue_with_room_leaves_no_event_waiting() {
     let _ = bench.device.publish(bench.now, &mut sent, |_, _| ());
     assert_eq!(sent.0.len(), 100);
 }
+
+/// The values in the image are no event.
+#[test]
+fn a_remote_frame_before_the_first_event_has_no_answer() {
+    let mut bench = Bench::operational(false, 0);
+    let request = Frame::remote(EVENTS, 2).unwrap();
+    let ask = |bench: &mut Bench| {
+        let _ = bench.device.on_frame(&request, bench.now, &mut bench.out);
+        bench.run(Duration::from_millis(10));
+        bench.sent(EVENTS)
+    };
+    assert_eq!(ask(&mut bench), 0);
+    bench.device.application_mut().events = 1;
+    bench.publish(0x2001, 1);
+    assert_eq!((bench.sent(EVENTS), ask(&mut bench)), (1, 1));
+}

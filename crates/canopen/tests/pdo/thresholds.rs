@@ -63,3 +63,31 @@ fn a_tpdo_of_type_255_waits_for_the_difference_from_the_value_that_it_has_sent_i
     assert_eq!(with_sync, values);
     assert_eq!(third, first);
 }
+
+/// The TPDOs of which the application learns.
+#[derive(Default)]
+struct Told(Vec<usize>);
+
+impl Application for Told {
+    const THRESHOLDS: bool = true;
+
+    fn sent(&mut self, tpdo: usize, _: &[u8]) {
+        self.0.push(tpdo);
+    }
+}
+
+/// TPDO 2 is sent with each SYNC.
+#[test]
+fn the_application_learns_of_tpdos_that_send_on_changes_only() {
+    let mut device: canopen::device!(Told, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Told::default());
+    let mut out = Sent::default();
+    let _ = device.start(Instant(0), &mut out);
+    for (id, data) in [(0, &[1, ID][..]), (0x80, &[])] {
+        let _ = device.on_frame(&Frame::new(id, data).unwrap(), Instant(1), &mut out);
+    }
+    let _ = device.poll(Instant(2), &mut out);
+    for base in [0x180, 0x280, 0x380] {
+        assert!(out.0.iter().any(|frame| frame.id() == base + u16::from(ID)), "{base:X}h");
+    }
+    assert_eq!(device.application().0, [0, 2]);
+}
