@@ -227,11 +227,6 @@ impl FaultSet {
         FaultSet { single: before ^ self.single, ..FaultSet::EMPTY }
     }
 
-    /// Removes the faults of heartbeats and RPDOs.
-    pub(crate) fn forget_several(&mut self) {
-        self.several = 0;
-    }
-
     /// Whether a fault is active that can be active only once; never for others.
     pub(crate) fn has(self, fault: Fault) -> bool {
         fault.bit().is_some_and(|bit| self.single & 1 << bit != 0)

@@ -118,7 +118,6 @@ impl Producer {
         self.history.clear();
         self.forget_waiting();
         self.errors = 0;
-        self.active.forget_several();
         self.raise_singles(details, now);
     }
 
@@ -166,7 +165,6 @@ impl Producer {
     /// As [`Producer::restart`], for a device without EMCY.
     pub(crate) fn restart_silently(&mut self) {
         self.errors = 0;
-        self.active.forget_several();
         for place in 0..Fault::PLACES {
             let Some(fault) = self.active.at(place) else { continue };
             self.errors |= self.class_of(fault);

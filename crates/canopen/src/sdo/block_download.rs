@@ -61,7 +61,7 @@ impl Receiver {
     pub(super) fn last(&self, has_heard: bool) -> u8 {
         match self.highest() {
             // A whole block is followed by another one.
-            0 if !has_heard && self.acknowledged < BlockSize::MAX.get() => self.acknowledged,
+            0 if !has_heard => self.acknowledged,
             highest => highest,
         }
     }

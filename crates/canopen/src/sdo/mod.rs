@@ -46,9 +46,10 @@ impl Segment {
         Segment { toggle: command & TOGGLE != 0, last: command & 1 != 0, data: Bytes::new(*data, 7 - unused) }
     }
 
-    fn encode(self, command: u8) -> [u8; 8] {
+    /// The frame, in either direction.
+    fn encode(self) -> [u8; 8] {
         let unused = 7 - self.data.len();
-        let mut frame = [command | u8::from(self.toggle) << 4 | unused << 1 | u8::from(self.last); 8];
+        let mut frame = [u8::from(self.toggle) << 4 | unused << 1 | u8::from(self.last); 8];
         let [_, data @ ..] = &mut frame;
         *data = self.data.padded();
         frame

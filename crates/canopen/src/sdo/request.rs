@@ -142,7 +142,7 @@ impl Request {
     pub fn encode(self) -> [u8; 8] {
         match self {
             Request::Download(multiplexer, initiate) => initiate.encode(multiplexer),
-            Request::DownloadSegment(segment) => segment.encode(0x00),
+            Request::DownloadSegment(segment) => segment.encode(),
             Request::Upload(multiplexer) => multiplexer.frame(0x40, [0; 4]),
             Request::UploadSegment { toggle } => [0x60 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0],
             Request::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),

@@ -102,7 +102,7 @@ impl Response {
                 let command = 0x40 | u8::from(size.is_some());
                 multiplexer.frame(command, size.unwrap_or(0).to_le_bytes())
             }
-            Response::UploadedSegment(segment) => segment.encode(0x00),
+            Response::UploadedSegment(segment) => segment.encode(),
             Response::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
             Response::BlockDownload(multiplexer, size) => {
                 multiplexer.frame(BLOCK_DOWNLOAD, [size.get(), 0, 0, 0])

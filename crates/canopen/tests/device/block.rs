@@ -313,6 +313,37 @@ fn the_rest_of_a_block_after_a_reset_is_no_request() {
     }
 }
 
+/// The server has acknowledged a pause, and the client begins its next block while the node starts.
+#[test]
+fn the_block_after_an_acknowledged_pause_and_a_reset_is_no_request() {
+    for accepted in 1..=3 {
+        let mut client = Client::new();
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: None });
+        for sequence in 1..=accepted {
+            client.send_segment(middle(LIKE_REQUESTS, sequence));
+        }
+        assert_eq!(client.wait(), Some(Response::BlockAcknowledge(accepted, BlockSize::MAX)));
+        client.bench.nmt(0x82);
+        client.bench.start();
+        assert_no_request(&mut client, 1, 0x0800_0022);
+    }
+}
+
+/// An image of a program has many equal segments. A frame that the bus doubles comes at once, not after a pause.
+#[test]
+fn a_block_after_a_pause_may_begin_like_the_block_before() {
+    let mut client = Client::new();
+    let content = vec![0xFF; 130 * 7];
+    client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(910) });
+    assert_eq!(client.send_segment(segment(&content, 0, 1)), None);
+    assert_eq!(client.wait(), Some(Response::BlockAcknowledge(1, BlockSize::MAX)));
+    for sequence in 1..=126 {
+        assert_eq!(client.send_segment(segment(&content, usize::from(sequence), sequence)), None);
+    }
+    let whole = client.send_segment(segment(&content, 127, 127));
+    assert_eq!(whole, Some(Response::BlockAcknowledge(127, BlockSize::MAX)));
+}
+
 /// The bus is broken for longer than the time-out within a block, and the adapter of the client keeps the rest of the block.
 #[test]
 fn the_rest_of_a_block_after_a_time_out_is_no_request() {
