@@ -125,4 +125,16 @@ mod tests {
             assert!((0..MEMORY).all(|_| shown.update(0) == 0));
         }
     }
+
+    #[test]
+    fn a_repeated_fault_is_forgotten_in_the_end() {
+        let mut shown = Shown::default();
+        let ends_after = |shown: &mut Shown| (1..=LONG_HOLD).find(|_| shown.update(0) == 1);
+        for expected in [HOLD, LONG_HOLD] {
+            assert_eq!(shown.update(1), 1);
+            assert_eq!(ends_after(&mut shown), Some(expected));
+        }
+        assert!((0..MEMORY).all(|_| shown.update(0) == 0));
+        assert_eq!((shown.update(1), ends_after(&mut shown)), (1, Some(HOLD)));
+    }
 }

@@ -42,12 +42,6 @@ impl PackedGroups {
         }
     }
 
-    pub(crate) fn clear(&mut self) {
-        for group in Group::COMMON {
-            self.get_mut(group).clear();
-        }
-    }
-
     /// Gives `fill` all the room of a group; `fill` returns the number of bytes in use.
     pub(crate) fn fill(&mut self, group: Group, fill: impl FnOnce(&mut [u8]) -> usize) {
         let values = self.get_mut(group);

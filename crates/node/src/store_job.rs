@@ -59,7 +59,6 @@ impl StoreJob {
 
     /// Packs the groups to be stored; a restore has nothing to pack.
     fn pack(&mut self) {
-        self.packed.clear();
         let Some(Job::Store(groups)) = self.job else { return };
         for group in groups.iter() {
             let (dictionary, image) = (self.personality.dictionary(), &self.image);

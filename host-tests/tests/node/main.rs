@@ -2,6 +2,7 @@
 //! without a clock. All tests are in one program, to save the link time of several programs.
 
 mod bit_timing;
+mod board_calls;
 mod calibration;
 mod cia404_chain;
 mod cia404_edges;

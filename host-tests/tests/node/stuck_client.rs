@@ -9,6 +9,8 @@ use host_tests::sdo::{Channel, Client, Failure};
 
 /// Time-out of the server, and a little more.
 const TIME_OUT: Duration = Duration::from_millis(1010);
+/// The pause within a block after which the server acknowledges it.
+const BLOCK_PAUSE: Duration = Duration::from_millis(300);
 /// Segments in a block of an upload.
 const BLOCK_SIZE: u8 = 10;
 
@@ -166,6 +168,8 @@ fn each_step(mut then: impl FnMut(&mut Bus, Transfer, usize)) {
 #[test]
 fn a_transfer_of_a_dead_client_is_aborted_after_the_time_out() {
     each_step(|network, transfer, step| {
+        // Within a block, the time-out begins when the server acknowledges the pause.
+        network.run(BLOCK_PAUSE);
         network.run(TIME_OUT);
         let last = responses(network).last().copied().and_then(Response::parse);
         // After the last segment of a segmented transfer and after the end of a block download, the server waits for no
