@@ -113,6 +113,16 @@ fn the_transfer_buffer_of_every_personality_returns_the_data_of_a_download() {
 }
 
 #[test]
+fn the_transfer_buffer_takes_4096_bytes_and_refuses_more_before_it_forgets_them() {
+    const TOO_LONG: u32 = 0x0607_0012;
+    let data: Vec<u8> = (0..4096_u32).map(|number| number as u8).collect();
+    let mut bench = Bench::booted();
+    bench.write(0x2F00, 0, &data).unwrap();
+    assert_eq!(bench.write(0x2F00, 0, &[0; 4097]), Err(TOO_LONG));
+    assert_eq!(bench.read(0x2F00, 0), Ok(data));
+}
+
+#[test]
 fn a_download_that_ends_halfway_leaves_the_transfer_buffer_empty() {
     let data: Vec<u8> = (0..100).collect();
     let begin = [0x21, 0x00, 0x2F, 0, 100, 0, 0, 0];
