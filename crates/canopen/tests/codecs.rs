@@ -325,3 +325,13 @@ fn a_remote_frame_has_a_can_id_and_at_most_eight_bytes() {
         assert_eq!(frame, is_valid.then_some((id, len.into(), true)), "{id:X}h, {len}");
     }
 }
+
+#[test]
+fn a_cob_id_has_eleven_bits_and_two_flags() {
+    for bits in [0, 0x4000_0000, 0x8000_0000] {
+        assert_eq!(CobId::parse(bits | 0x7FF).map(CobId::encode), Some(bits | 0x7FF));
+        for wrong in [0x800, 0x2000_0000] {
+            assert_eq!(CobId::parse(bits | wrong), None, "{:08X}h", bits | wrong);
+        }
+    }
+}

@@ -122,6 +122,25 @@ fn a_deadline_ends_with_the_pdo() {
     assert!(!bench.device.process_ids().any(|id| id.get() == RPDO1));
 }
 
+/// CiA 301, table 71: the indices of the data types, with their lengths.
+#[test]
+fn every_dummy_entry_has_the_length_of_its_type() {
+    for (index, bits) in [(2_u32, 8_u32), (3, 16), (4, 32), (5, 8), (6, 16), (7, 32)] {
+        let mut bench = Bench::operational();
+        bench.write(0x1600, 0, &[0]).unwrap();
+        bench.write32(0x1600, 2, 0x6200_0010).unwrap();
+        for wrong in [8, 16, 32].into_iter().filter(|wrong| *wrong != bits) {
+            assert!(bench.write32(0x1600, 1, index << 16 | wrong).is_err(), "{index:04X}h with {wrong} bits");
+        }
+        bench.write32(0x1600, 1, index << 16 | bits).unwrap();
+        bench.write(0x1600, 0, &[2]).unwrap();
+        bench.write32(0x1400, 1, RPDO1.into()).unwrap();
+        let data = [vec![0xFF; bits as usize / 8], vec![9, 0]].concat();
+        send(&mut bench, RPDO1, &data);
+        assert_eq!(value(&mut bench), [9, 0], "{index:04X}h");
+    }
+}
+
 #[test]
 fn dummy_entries_skip_bytes() {
     let mut bench = bench();
