@@ -325,3 +325,9 @@ fn a_remote_frame_has_a_can_id_and_at_most_eight_bytes() {
         assert_eq!(frame, is_valid.then_some((id, len.into(), true)), "{id:X}h, {len}");
     }
 }
+
+#[test]
+fn an_abort_is_shown_with_its_meaning_and_its_code() {
+    let text = canopen::sdo::Abort::NoObject.to_string();
+    assert_eq!(text, "object does not exist in the object dictionary (06020000h)");
+}
