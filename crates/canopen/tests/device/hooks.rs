@@ -176,14 +176,3 @@ fn the_application_writes_the_objects_of_pdos() {
         assert!(!write(index, sub, bytes), "{index:X}h has a service");
     }
 }
-
-/// 6201h has a rule, 6203h has limits, and neither is stored with 1010h.
-#[test]
-fn an_rpdo_reports_new_parameters_only_for_objects_with_a_rule() {
-    for (object, data, is_parameter) in [(0x6201_0008, &[12][..], true), (0x6203_0010, &[5, 0], false)] {
-        let mut bench = mapped(&[object]);
-        bench.take_parameters();
-        receive(&mut bench, data);
-        assert_eq!(bench.take_parameters(), is_parameter, "{object:08X}h");
-    }
-}

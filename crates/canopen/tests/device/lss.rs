@@ -371,18 +371,3 @@ fn the_longest_delay_ends_in_time() {
     bench.run(Duration::from_millis(1));
     assert_eq!(bench.take_action(), BitRate::from_kbit(500).map(Action::BitRate));
 }
-
-/// The write of a COB-ID arrives when the bit rate changes.
-#[test]
-fn new_identifiers_wait_behind_a_new_bit_rate() {
-    let mut bench = Bench::booted();
-    configuration(&mut bench, true);
-    send(&mut bench, Request::BitTiming { table: 0, index: 2 });
-    while bench.take_action().is_some() {}
-    send(&mut bench, Request::Activate { delay: 1 });
-    bench.now = bench.now + Duration::from_millis(1);
-    let write = [0x23, 0x00, 0x14, 1, 0x06, 0x02, 0, 0x80];
-    bench.receive(Frame::new(0x600 + u16::from(ID), &write).unwrap());
-    let actions = [bench.take_action(), bench.take_action(), bench.take_action()];
-    assert_eq!(actions, [BitRate::from_kbit(500).map(Action::BitRate), Some(Action::Identifiers), None]);
-}

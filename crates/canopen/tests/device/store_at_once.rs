@@ -280,15 +280,6 @@ fn a_second_restore_of_the_same_group_waits_for_the_reset_too() {
     }
 }
 
-/// 14 at 6201h switches PDOs off, and the value is stored.
-#[test]
-fn a_job_waits_behind_another_action() {
-    let mut bench = booted();
-    request(&mut bench, preset(14));
-    let actions = [bench.take_action(), bench.take_action(), bench.take_action()];
-    assert_eq!(actions, [Some(Action::Identifiers), Some(Action::Store(Job::Store(APPLICATION))), None]);
-}
-
 #[test]
 fn the_last_segment_of_a_preset_is_answered_when_the_preset_is_stored() {
     let mut bench = booted();
