@@ -312,6 +312,7 @@ fn the_two_lowest_bits_of_a_command_say_what_the_four_data_bytes_are() {
     }
 }
 
+#[test]
 fn a_remote_frame_has_a_can_id_and_at_most_eight_bytes() {
     for (id, len, is_valid) in [
         (0, 0, true),
@@ -334,4 +335,10 @@ fn a_cob_id_has_eleven_bits_and_two_flags() {
             assert_eq!(CobId::parse(bits | wrong), None, "{:08X}h", bits | wrong);
         }
     }
+}
+
+#[test]
+fn an_abort_is_shown_with_its_meaning_and_its_code() {
+    let text = canopen::sdo::Abort::NoObject.to_string();
+    assert_eq!(text, "object does not exist in the object dictionary (06020000h)");
 }

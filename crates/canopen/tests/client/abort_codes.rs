@@ -22,3 +22,13 @@ fn two_codes_say_that_there_is_no_such_entry() {
     let absent = Abort::ALL.into_iter().filter(|&abort| AbortCode::from(abort).is_absent());
     assert_eq!(absent.collect::<Vec<_>>(), [Abort::NoObject, Abort::NoSubIndex]);
 }
+
+#[test]
+fn some_codes_refuse_the_protocol_and_not_the_value() {
+    let refuses_protocol = |code| AbortCode(code).is_protocol();
+    assert!([0x0503_0000, 0x0504_0001, 0x0504_0002, 0x0504_0005].into_iter().all(refuses_protocol));
+    let time_out = Abort::TimeOut.code();
+    assert!(
+        ![time_out, 0x0502_0000, 0x0601_0000, 0x0602_0000, 0x0800_0000].into_iter().any(refuses_protocol)
+    );
+}

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use canopen::client::lss::{self, Error, Fastscan, Name, Options};
 use canopen::client::{Service, Step, Taken};
-use canopen::lss::{Identity, Part, Request, Response};
+use canopen::lss::{BitRate, Identity, Part, Request, Response};
 use canopen::{Duration, Frame, Instant, NodeId};
 
 const OPTIONS: Options = Options { timeout: Duration::from_millis(10), retries: 2 };
@@ -188,4 +188,47 @@ fn fastscan_takes_no_other_frame_for_an_answer() {
     }
     assert_eq!(scan.next(Instant(1)), Step::Wait(Instant(10_000)));
     assert_eq!(scan.next(Instant(10_000)), Step::Done(Ok(None)), "no slave");
+}
+
+/// Other slaves may answer a little later.
+#[test]
+fn a_question_ends_a_quarter_of_the_time_out_after_an_answer() {
+    let options = Options { timeout: Duration(10_001), ..OPTIONS };
+    let identified = Frame::new(0x7E4, &Response::Identified.encode()).unwrap();
+    let mut scan = Fastscan::new(options);
+    assert!(matches!(scan.next(Instant(0)), Step::Send(_)));
+    assert_eq!(scan.on_frame(&identified, Instant(1000)), Taken::Used);
+    assert_eq!(scan.next(Instant(1000)), Step::Wait(Instant(3500)));
+    assert!(matches!(scan.next(Instant(3500)), Step::Send(_)));
+}
+
+/// The step after these responses, of which the last one must be the answer.
+fn outcome<T: Copy>(mut exchange: lss::Exchange<T>, responses: &[Response]) -> Result<T, Error> {
+    assert!(matches!(exchange.next(Instant(0)), Step::Send(_)));
+    let (answer, others) = responses.split_last().unwrap();
+    for (response, taken) in
+        others.iter().map(|other| (other, Taken::Unexpected)).chain([(answer, Taken::Used)])
+    {
+        let frame = Frame::new(0x7E4, &response.encode()).unwrap();
+        assert_eq!(exchange.on_frame(&frame, Instant(1)), taken, "{response:?}");
+    }
+    match exchange.next(Instant(1)) {
+        Step::Done(result) => result,
+        _ => panic!("the service has not ended"),
+    }
+}
+
+#[test]
+fn each_service_has_its_own_answer() {
+    use Response::{BitTiming, Identified, NodeIdIs, Stored, Unconfigured};
+    assert_eq!(outcome(lss::identify_unconfigured(OPTIONS), &[Identified, Unconfigured]), Ok(()));
+    let identity = [Response::Identity(Part::Vendor, 1), Response::Identity(Part::Serial, 2)];
+    assert_eq!(outcome(lss::inquire(Part::Serial, OPTIONS), &identity), Ok(2), "of the part asked for");
+    let node_id = |id| outcome(lss::inquire_node_id(OPTIONS), &[Unconfigured, NodeIdIs(id)]);
+    assert_eq!((node_id(5), node_id(255)), (Ok(NodeId::new(5)), Ok(None)));
+    let bit_rate =
+        |code| outcome(lss::set_bit_rate(BitRate::FASTEST, OPTIONS), &[Stored(code), BitTiming(code)]);
+    assert_eq!((bit_rate(0), bit_rate(1)), (Ok(()), Err(Error::Refused(Name::BitRate, 1))));
+    let store = |code| outcome(lss::store(OPTIONS), &[BitTiming(code), Stored(code)]);
+    assert_eq!((store(0), store(2)), (Ok(()), Err(Error::Refused(Name::Store, 2))));
 }

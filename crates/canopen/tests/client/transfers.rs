@@ -4,7 +4,7 @@ use canopen::client::sdo::{
     AbortCode, BlockDownload, BlockUpload, Buffer, Download, Error, Options, SEGMENT_TIME, Upload,
 };
 use canopen::client::{Service, Step, Taken};
-use canopen::sdo::{Abort, BlockSize, Bytes, Multiplexer, Response};
+use canopen::sdo::{Abort, BlockEnd, BlockSize, Bytes, Initiate, Multiplexer, Request, Response, Segment};
 use canopen::{Frame, Instant};
 
 use crate::server::{Device, NODE, OBJECT, Outcome, Server, once, run};
@@ -302,6 +302,141 @@ fn an_acknowledge_before_the_last_segment_of_a_block_counts() {
     assert_eq!(download.transferred(), 0);
     tell(&mut download, Response::BlockAcknowledge(20, BlockSize::MAX), 301);
     assert_eq!((segments(&mut download, 301).len(), download.transferred()), (127, 140));
+}
+
+/// No segment of the block before has arrived either, so none of it can wait in the adapter.
+#[test]
+fn a_late_acknowledge_of_nothing_leaves_no_rest() {
+    let data = value(2 * 889);
+    let mut download = first_block_sent(&data);
+    tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), 301);
+    assert_eq!(segments(&mut download, 301).len(), 127);
+    tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), 350);
+    assert_eq!((segments(&mut download, 350).len(), download.transferred()), (127, 0));
+}
+
+#[test]
+fn an_empty_value_is_sent_again_until_its_segment_is_acknowledged() {
+    let mut download = BlockDownload::new(NODE, OBJECT, &[], once());
+    assert!(matches!(download.next(Instant(0)), Step::Send(_)));
+    tell(&mut download, Response::BlockDownload(OBJECT, BlockSize::MAX), 0);
+    assert_eq!(segments(&mut download, 0), [0x81]);
+    tell(&mut download, Response::BlockAcknowledge(0, BlockSize::MAX), 1);
+    assert_eq!(segments(&mut download, 1), [0x81]);
+    tell(&mut download, Response::BlockAcknowledge(1, BlockSize::MAX), 2);
+    assert_eq!(segments(&mut download, 2), [0xDD], "the end, with seven unused bytes");
+}
+
+#[test]
+fn up_to_four_bytes_are_written_with_one_request() {
+    for data in [&[1][..], &[1, 2, 3, 4]] {
+        let (outcome, _, sent) = run(&mut Download::new(NODE, OBJECT, data, once()), &mut Server::new(&[]));
+        let request = Request::Download(OBJECT, Initiate::Expedited(Bytes::from_slice(data)));
+        assert_eq!((outcome, sent.len(), sent[0].data()), (Ok(()), 1, &request.encode()[..]));
+    }
+}
+
+#[test]
+fn an_acknowledge_with_the_toggle_bit_of_another_segment_counts_for_nothing() {
+    let mut wrong = |request: [u8; 8]| match Request::parse(&request) {
+        Some(Request::Download(at, _)) => vec![Response::Downloaded(at).encode()],
+        _ => vec![Response::DownloadedSegment { toggle: true }.encode()],
+    };
+    let mut download = Download::new(NODE, OBJECT, &[0; 5], once());
+    assert_eq!(run(&mut download, &mut wrong).0, Err(Error::Unexpected));
+    assert_eq!(download.transferred(), 0);
+}
+
+#[test]
+fn less_data_than_announced_is_against_the_protocol() {
+    let mut short = |request: [u8; 8]| match Request::parse(&request) {
+        Some(Request::Upload(at)) => vec![Response::UploadSegmented(at, Some(8)).encode()],
+        Some(Request::UploadSegment { toggle }) => {
+            vec![
+                Response::UploadedSegment(Segment { toggle, last: true, data: Bytes::new([1; 7], 7) })
+                    .encode(),
+            ]
+        }
+        _ => vec![],
+    };
+    assert_eq!(upload(&mut short, once()).0, Err(Error::Unexpected));
+}
+
+#[test]
+fn the_begin_of_a_block_upload_of_another_object_begins_nothing() {
+    let other = Multiplexer { index: 0x2001, sub: 0 };
+    let mut wrong = |_: [u8; 8]| vec![Response::BlockUpload { at: other, crc: true, size: None }.encode()];
+    let mut memory = [0; 8];
+    let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
+    let (outcome, _, sent) = run(&mut transfer, &mut wrong);
+    assert_eq!((outcome, sent.len()), (Err(Error::Unexpected), 2), "the request and the abort message");
+}
+
+/// The announced size decides how long the last segment is.
+#[test]
+fn a_full_last_segment_may_have_seven_unused_bytes() {
+    let mut server = Server::new(&value(14));
+    let mut odd = |request: [u8; 8]| {
+        let mut answers = server.answer(request);
+        for answer in &mut answers {
+            if let Some(Response::BlockUploadEnd(end)) =
+                Response::parse(*answer).filter(|_| answer[0] >> 5 == 6)
+            {
+                *answer = Response::BlockUploadEnd(BlockEnd { unused: 7, ..end }).encode();
+            }
+        }
+        answers
+    };
+    let (outcome, read, _) = block_upload(&mut odd, once());
+    assert_eq!((outcome, read), (Ok(()), value(14)));
+}
+
+/// The numbers of bytes that a transfer reports: one with each frame that it sends, and the one of its end.
+fn progress<S: Service<Output = Outcome>>(
+    transfer: &mut S,
+    transferred: fn(&S) -> usize,
+    device: &mut impl Device,
+) -> Vec<usize> {
+    let mut reported = vec![];
+    loop {
+        match transfer.next(Instant(0)) {
+            Step::Send(frame) => {
+                reported.push(transferred(transfer));
+                for answer in device.answer(frame.data().try_into().unwrap()) {
+                    transfer.on_frame(&Frame::new(0x585, &answer).unwrap(), Instant(0));
+                }
+            }
+            Step::Wait(_) => panic!("no answer"),
+            Step::Done(outcome) => {
+                assert_eq!(outcome, Ok(()));
+                return [reported, vec![transferred(transfer)]].concat();
+            }
+        }
+    }
+}
+
+#[test]
+fn an_upload_reports_its_progress() {
+    let mut server = Server::new(&value(20));
+    let mut memory = [0; 20];
+    let mut transfer = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
+    assert_eq!(progress(&mut transfer, |transfer| transfer.transferred(), &mut server), [0, 0, 7, 14, 20]);
+    let mut memory = [0; 20];
+    let options = Options { block_size: BlockSize::new(2).unwrap(), ..once() };
+    let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), options);
+    // The newest segment is held back.
+    assert_eq!(
+        progress(&mut transfer, |transfer| transfer.transferred(), &mut server),
+        [0, 0, 7, 14, 20, 20]
+    );
+    // The server chooses segments.
+    let mut simple = |request: [u8; 8]| match Request::parse(&request) {
+        Some(Request::BlockUpload { at, .. }) => server.answer(Request::Upload(at).encode()),
+        _ => server.answer(request),
+    };
+    let mut memory = [0; 20];
+    let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
+    assert_eq!(progress(&mut transfer, |transfer| transfer.transferred(), &mut simple), [0, 0, 7, 14, 20]);
 }
 
 #[test]

@@ -699,3 +699,11 @@ fn a_begin_or_an_acknowledge_that_comes_again_later_ends_an_upload() {
     assert_eq!(client.bench.ask(all), Some(Response::BlockUploadEnd(end(&data(35)))));
     assert_eq!(client.bench.ask(Request::BlockAcknowledge { sequence: 2, block_size: 3 }), abort);
 }
+
+#[test]
+fn the_end_of_a_download_may_come_twice() {
+    let mut client = Client::new();
+    assert_eq!(client.download(DOMAIN, &data(20)), Response::BlockDownloaded);
+    let again = client.bench.ask(Request::BlockDownloadEnd(end(&data(20))));
+    assert_eq!((again, client.bench.device.application().downloads), (Some(Response::BlockDownloaded), 1));
+}

@@ -371,3 +371,11 @@ fn a_client_waits_for_the_boot_up_message() {
     let _ = node.poll(Instant(2000), &mut Sent::default());
     assert!(node.sdo_client(1).is_some());
 }
+
+#[test]
+fn the_identifiers_have_the_requests_of_each_server() {
+    let mut node = with_two_channels();
+    enable(&mut node, 0x1202, (0x6A1, 0x6B1));
+    let ids: Vec<u16> = node.service_ids().map(canopen::CanId::get).collect();
+    assert!([DEFAULT.0, SECOND.0, 0x6A1].iter().all(|id| ids.contains(id)), "{ids:03X?}");
+}

@@ -1,8 +1,13 @@
 //! EMCY: messages, error register, the list 1003h and the COB-ID 1014h.
 
-use crate::bench::{Bench, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL};
+use crate::bench::{Bench, ID, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL};
+use crate::types::Sent;
+use canopen::dictionary::{Dictionary, Object};
 use canopen::emcy::Message;
-use canopen::{BusEvent, Duration, Frame};
+use canopen::nmt::{Command, State};
+use canopen::{
+    Application, BusEvent, Condition, Device, Duration, ErrorClass, Frame, Instant, NodeId, objects,
+};
 
 fn emcy(code: u16, register: u8) -> (u16, Vec<u8>) {
     (0x085, Message { code, register, detail: [0; 5] }.encode().to_vec())
@@ -255,4 +260,82 @@ fn every_one_of_many_faults_is_reported() {
         bench.poll();
         assert_eq!(bench.sent(), [emcy(0x5006, 1), emcy(0, 0)]);
     }
+}
+
+#[test]
+fn enabling_1014h_reports_the_faults_of_syncs_and_of_multiplexed_pdos() {
+    let mut bench = Bench::operational();
+    bench.write(0x1600, 0, &[0xFF]).unwrap();
+    bench.write32(0x1400, 1, 0x205).unwrap();
+    bench.write32(0x1006, 0, 10_000).unwrap();
+    bench.sync();
+    bench.run(Duration::from_millis(20));
+    bench.receive(Frame::new(0x080, &[1]).unwrap());
+    bench.receive(Frame::new(0x205, &[0x85, 0x00, 0x70, 0, 1, 2, 3, 4]).unwrap());
+    assert_eq!(codes(&mut bench), [0x8100, 0x8240, 0x8230]);
+    bench.write32(0x1014, 0, 0x8000_0085).unwrap();
+    bench.write32(0x1014, 0, 0x85).unwrap();
+    bench.poll();
+    assert_eq!(codes(&mut bench), [0x8100, 0x8240, 0x8230]);
+}
+
+#[test]
+fn an_equal_value_of_1014h_reports_no_fault_again() {
+    let mut bench = Bench::booted();
+    bench.raise(SENSOR_BREAK);
+    bench.poll();
+    assert_eq!(codes(&mut bench), [0x5006]);
+    bench.write32(0x1014, 0, 0x85).unwrap();
+    bench.poll();
+    assert_eq!((codes(&mut bench), bench.read(0x1003, 0)), (vec![], Ok(vec![1])));
+}
+
+const PLAIN_ROWS: &[Object] = canopen::rows!(
+    [objects::device_type(0), objects::error_register()],
+    objects::identity(0, 1, 1),
+    objects::error_behaviour(0),
+);
+static PLAIN_DICTIONARY: Dictionary = canopen::dictionary!(PLAIN_ROWS);
+
+/// A device without EMCY, with a condition of each kind.
+struct Plain;
+
+impl Application for Plain {
+    const CONDITIONS: &'static [Condition] = &[
+        Condition { register: 0b0100, ..Condition::new(0x3110) },
+        Condition { register: 0b1000, ..Condition::new(0x4210) },
+        Condition::new(0x5003).of_class(ErrorClass::DEVICE),
+    ];
+}
+
+fn plain() -> canopen::device!(Plain, PLAIN_ROWS) {
+    let mut device = Device::new(&PLAIN_DICTIONARY, NodeId::new(ID), Plain);
+    let _ = device.start(Instant(0), &mut Sent::default());
+    let _ = device.nmt(Command::Start, Instant(0), &mut Sent::default());
+    device
+}
+
+#[test]
+fn each_condition_has_its_own_bits_of_the_error_register() {
+    let mut device = plain();
+    for (number, register) in [(1, 0b1001), (0, 0b1101)] {
+        let _ = device.set_condition(number, true, Instant(1));
+        assert_eq!(PLAIN_DICTIONARY.field(0x1001, 0).u8(device.image()), register);
+    }
+}
+
+#[test]
+fn without_emcy_a_fault_is_an_error_once_and_its_end_is_none() {
+    let mut device = plain();
+    let mut set = |number, active| {
+        let _ = device.set_condition(number, active, Instant(1));
+        let _ = device.poll(Instant(1), &mut Sent::default());
+        let state = device.state();
+        let _ = device.nmt(Command::Start, Instant(1), &mut Sent::default());
+        state
+    };
+    assert_eq!(set(2, true), State::PreOperational);
+    assert_eq!(set(2, true), State::Operational, "the same fault");
+    assert_eq!(set(0, true), State::Operational, "a fault without a class");
+    assert_eq!(set(2, false), State::Operational);
 }

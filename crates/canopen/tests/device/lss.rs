@@ -357,3 +357,17 @@ fn a_fastscan_with_a_part_out_of_range_has_no_answer() {
     }
     assert_eq!(send(&mut bench, confirm(3, 3)), Some(Response::Identified));
 }
+
+/// The epoch of the clock inside the device moves meanwhile.
+#[test]
+fn the_longest_delay_ends_in_time() {
+    let mut bench = Bench::booted();
+    bench.take_action();
+    configuration(&mut bench, true);
+    send(&mut bench, Request::BitTiming { table: 0, index: 2 });
+    send(&mut bench, Request::Activate { delay: u16::MAX });
+    bench.run(Duration::from_millis(65_534));
+    assert_eq!(bench.take_action(), None);
+    bench.run(Duration::from_millis(1));
+    assert_eq!(bench.take_action(), BitRate::from_kbit(500).map(Action::BitRate));
+}

@@ -1,9 +1,11 @@
 //! Multiplexed PDOs, in both directions and in both modes.
 
 use crate::bench::{Bench, DICTIONARY, ID, Told};
-use canopen::Duration;
-use canopen::Frame;
+use crate::exchange;
+use crate::types::Sent;
+use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
 use canopen::sdo::Multiplexer;
+use canopen::{Device, Duration, Frame, Instant, NodeId, objects};
 
 const TPDO: u16 = 0x500 + ID as u16;
 const RPDO: u16 = 0x205;
@@ -446,6 +448,7 @@ fn the_identifiers_are_those_of_the_own_frames_and_then_of_each_of_127_nodes() {
     assert!(ids.eq(expected), "{:03X?}", bench.device.process_ids().collect::<Vec<_>>());
 }
 
+#[test]
 fn the_event_timer_and_the_inhibit_time_keep_their_length_for_minutes() {
     let mut bench = sender(DESTINATION);
     bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
@@ -470,4 +473,42 @@ fn an_rpdo_of_mapped_objects_takes_no_frames_of_other_nodes() {
     let ids: Vec<u16> = bench.device.process_ids().map(canopen::CanId::get).collect();
     assert!(ids.contains(&RPDO) && !ids.contains(&0x210), "{ids:03X?}");
     assert!(bench.device.process_filters().all(|(_, mask)| mask == 0x7FF));
+}
+
+/// A multiplexed TPDO is valid, but none of those that send values.
+#[test]
+fn a_write_that_may_switch_pdos_leaves_the_identifiers_of_a_multiplexed_tpdo() {
+    let mut bench = sender(DESTINATION);
+    while bench.take_action().is_some() {}
+    bench.write(0x6201, 0, &[12]).unwrap();
+    assert_eq!(bench.take_action(), None);
+}
+
+const ROWS: &[Object] = canopen::rows!(
+    [objects::device_type(0)],
+    objects::identity(0, 1, 1),
+    objects::multiplexed(objects::rpdo(1, &[])),
+    [Object::new(0x6200, 0, "", Type::Unsigned16, Access::ReadWrite).mappable(Mapping::Rpdo)],
+);
+static RPDO_DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+
+#[test]
+fn a_multiplexed_rpdo_takes_the_frames_of_one_can_id_by_default() {
+    let mut device: canopen::device!((), ROWS) = Device::new(&RPDO_DICTIONARY, NodeId::new(ID), ());
+    let mut sent = Sent::default();
+    let _ = device.start(Instant(0), &mut sent);
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(0), &mut sent);
+    for (index, sub, bytes) in [(0x1600, 0, &[DESTINATION][..]), (0x1400, 1, &[0x05, 0x02, 0, 0])] {
+        let written = exchange::write(ID, Multiplexer { index, sub }, bytes, |request| {
+            let mut sent = Sent::default();
+            let _ = device.on_service_frame(&request, Instant(0), &mut sent);
+            sent.0
+        });
+        assert_eq!(written, Ok(()), "{index:04X}h:{sub}");
+    }
+    for (id, expected) in [(RPDO + 1, 0), (RPDO, 0x1234)] {
+        let frame = Frame::new(id, &[0x80, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap();
+        let _ = device.on_frame(&frame, Instant(1), &mut sent);
+        assert_eq!(RPDO_DICTIONARY.field(0x6200, 0).u16(device.image()), expected, "{id:03X}h");
+    }
 }

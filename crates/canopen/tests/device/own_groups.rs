@@ -195,3 +195,14 @@ fn a_group_that_stays_damaged_is_no_new_fault_at_a_reset() {
         assert_eq!(node.application().faults, [(Fault::StoredData(Group::Own4), true)]);
     }
 }
+
+#[test]
+fn a_damaged_group_without_values_is_not_reported_as_good() {
+    let mut node = node();
+    node.application_mut().damaged = Some(Group::Own4);
+    node.application_mut().loaded.clear();
+    let _ = node.nmt(Command::ResetNode, Instant(3), &mut Sent::default());
+    start(&mut node);
+    let loaded = &node.application().loaded;
+    assert!(loaded.contains(&(Group::Own4, false)) && loaded.contains(&(Group::Own5, true)), "{loaded:?}");
+}

@@ -273,3 +273,15 @@ fn the_producer_keeps_its_period_for_minutes() {
     assert!(times.windows(2).all(|pair| pair[1] - pair[0] == SECOND), "{times:?}");
     assert_eq!(times.len(), 200);
 }
+
+#[test]
+fn after_a_delay_of_a_whole_period_one_sync_is_sent() {
+    let mut node = node();
+    assert_eq!(run(&mut node, (1, 5000), &[0x80]).len(), 1);
+    let mut sent = Sent::default();
+    for _ in 0..2 {
+        let _ = node.poll(Instant(20_001), &mut sent);
+    }
+    assert_eq!(sent.0.iter().filter(|frame| frame.id() == 0x80).count(), 1);
+    assert_eq!(node.poll(Instant(20_001), &mut sent).process, Instant(30_001));
+}

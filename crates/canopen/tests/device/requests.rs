@@ -108,3 +108,15 @@ fn a_short_request_is_taken_if_the_application_wants_it() {
         assert_eq!(sent.0, [], "{other:X}h is no request to this node");
     }
 }
+
+#[test]
+fn an_empty_frame_and_a_remote_frame_are_no_requests() {
+    let mut node = node!(true);
+    let id = 0x600 + u16::from(ID);
+    let remote = (0..=8).map(|len| Frame::remote(id, len).unwrap());
+    for frame in remote.chain(Frame::new(id, &[])) {
+        let mut sent = Sent::default();
+        let _ = node.on_frame(&frame, Instant(1), &mut sent);
+        assert_eq!(sent.0, [], "{frame:?}");
+    }
+}

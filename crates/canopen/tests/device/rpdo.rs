@@ -205,6 +205,7 @@ fn a_value_for_the_application_may_change_parameters_and_another_one_does_not() 
     }
 }
 
+#[test]
 fn a_deadline_keeps_its_length_for_minutes() {
     let mut bench = bench();
     bench.write(0x1400, 5, &20_000_u16.to_le_bytes()).unwrap();

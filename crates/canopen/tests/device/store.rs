@@ -380,6 +380,7 @@ fn the_soundness_of_each_group_is_kept_apart() {
     }
 }
 
+#[test]
 fn a_buffer_that_is_too_small_is_an_error_that_says_so() {
     let bench = Bench::booted();
     let whole = packed(&bench, Group::Application).len();
@@ -390,4 +391,14 @@ fn a_buffer_that_is_too_small_is_an_error_that_says_so() {
         let expected = "the buffer has no room for all values of the group".to_owned();
         assert_eq!(message, if len == whole { Ok(whole) } else { Err(expected) }, "{len} bytes");
     }
+}
+
+/// RPDO 2 is not valid by default.
+#[test]
+fn a_pdo_that_was_stored_as_valid_stays_valid() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1401, 1, 0x305).unwrap();
+    save(&mut bench);
+    reset(&mut bench, RESET_COMMUNICATION);
+    assert_eq!(bench.read(0x1401, 1), Ok(vec![0x05, 0x03, 0, 0]));
 }

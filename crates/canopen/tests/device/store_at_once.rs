@@ -3,7 +3,7 @@
 
 use crate::bench::{Bench, DICTIONARY};
 use canopen::dictionary::{Group, Groups};
-use canopen::sdo::Abort;
+use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Segment};
 use canopen::{Action, Frame, Job};
 
 const APPLICATION: Groups = Groups::one(Group::Application);
@@ -278,4 +278,15 @@ fn a_second_restore_of_the_same_group_waits_for_the_reset_too() {
             assert_eq!(bench.write(PRESET, 0, &[7]), Err(DEVICE_STATE), "1011h:{first}, 1011h:{second}");
         }
     }
+}
+
+#[test]
+fn the_last_segment_of_a_preset_is_answered_when_the_preset_is_stored() {
+    let mut bench = booted();
+    let at = Multiplexer { index: PRESET, sub: 0 };
+    assert!(bench.ask(Request::Download(at, Initiate::Segmented(Some(1)))).is_some());
+    let segment = Segment { toggle: false, last: true, data: Bytes::from_slice(&[7]) };
+    assert_eq!(bench.ask(Request::DownloadSegment(segment)), None, "the response waits");
+    assert_eq!((job(&mut bench), value(&bench)), (Some(Job::Store(APPLICATION)), 7));
+    assert_eq!(finish(&mut bench, Ok(())), [[0x20, 0, 0, 0, 0, 0, 0, 0]]);
 }

@@ -374,3 +374,28 @@ fn the_bus_share_counts_the_time_across_a_move_of_the_epoch() {
     bench.poll();
     assert_eq!(sent(&mut bench), [[3, 0, 0, 0]], "after 60 ms, the share is full");
 }
+
+#[test]
+fn type_253_has_no_inhibit_time_after_operational_was_left_either() {
+    let mut bench = bench(253, 50_000, 0);
+    request(&mut bench);
+    assert_eq!(sent(&mut bench).len(), 1);
+    bench.nmt(0x80);
+    bench.nmt(1);
+    request(&mut bench);
+    assert_eq!(sent(&mut bench).len(), 1);
+}
+
+#[test]
+fn a_stored_inhibit_time_does_not_begin_before_a_reset() {
+    let mut bench = Bench::unstarted();
+    // 1800h:3, 5 s.
+    bench.device.application_mut().stored[0] = vec![0x00, 0x18, 3, 1, 2, 0x50, 0xC3];
+    for _ in 0..2 {
+        bench.start();
+        bench.take();
+        bench.nmt(1);
+        assert_eq!(sent(&mut bench).len(), 1);
+        bench.nmt(0x82);
+    }
+}

@@ -91,3 +91,29 @@ fn the_application_learns_of_tpdos_that_send_on_changes_only() {
     }
     assert_eq!(device.application().0, [0, 2]);
 }
+
+/// An application that leaves the thresholds and the events as they are.
+struct Usual;
+
+impl Application for Usual {
+    const SENDS_EVENTS: bool = true;
+    const THRESHOLDS: bool = true;
+
+    fn sends_events(&self, tpdo: u16) -> bool {
+        tpdo == 3
+    }
+}
+
+#[test]
+fn every_change_is_large_enough_and_there_is_no_event_by_default() {
+    let mut device: canopen::device!(Usual, ROWS) = Device::new(&DICTIONARY, NodeId::new(ID), Usual);
+    let mut out = Sent::default();
+    let _ = device.start(Instant(0), &mut out);
+    let _ = device.on_frame(&Frame::new(0, &[1, ID]).unwrap(), Instant(0), &mut out);
+    for value in 51..=53 {
+        let now = Instant(1000 * u64::from(value));
+        let _ = device.publish(now, &mut out, |_, image| AT.set_u8(image, value));
+    }
+    let sent = |base| out.0.iter().filter(|frame| frame.id() == base + u16::from(ID)).count();
+    assert_eq!((sent(0x180), sent(0x380)), (4, 0), "TPDO 3 sends events");
+}
