@@ -18,10 +18,19 @@ const STARTED: Time = Time::from_millis(600);
 const ROUNDS: u8 = 10;
 
 /// The result of a run: the entries of each task, and every deviation that an engineer would notice.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 struct Said {
     entries: [u64; TASKS.len()],
     told: Vec<String>,
+}
+
+impl Said {
+    /// Without a barrier the tasks begin some cycles earlier, so the end of the run may come one entry later or earlier. A
+    /// flag that is cleared too late enters its task twice each time.
+    fn is_like(&self, right: &Said) -> bool {
+        let mut pairs = self.entries.iter().zip(&right.entries);
+        self.told == right.told && pairs.all(|(entries, right)| entries.abs_diff(*right) <= 1)
+    }
 }
 
 /// An encoder that answers, is synchronised, and writes its backup memory.
@@ -91,7 +100,7 @@ fn without_one_barrier_the_images_still_run() {
         let places = all.iter().filter(|(_, function)| function == name).map(|(address, _)| *address);
         let said = run(|world| places.clone().for_each(|address| world.machine(0).omit_barrier(address)));
         println!("without {} of {name}: {:?} {:?}", places.clone().count(), said.entries, said.told);
-        assert_eq!(said, right, "without the barriers of {name}");
+        assert!(said.is_like(&right), "without the barriers of {name}: {said:?} instead of {right:?}");
     }
 }
 
