@@ -303,8 +303,6 @@ impl<O: Objects> Server<O> {
             Transfer::BlockDownload(receiver)
                 if O::BLOCK_DOWNLOAD && receiver.is_within_block() && now < self.active.plus(TIME_OUT) =>
             {
-                // A segment that is equal to the one before the pause is no repetition of it. None has number 0.
-                self.previous[0] = 0;
                 self.active = now;
                 receiver.acknowledge()
             }
