@@ -437,6 +437,15 @@ fn an_upload_reports_its_progress() {
     let mut memory = [0; 20];
     let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
     assert_eq!(progress(&mut transfer, |transfer| transfer.transferred(), &mut simple), [0, 0, 7, 14, 20]);
+    // A short value comes with the first answer.
+    let mut server = Server::new(&value(4));
+    let mut expedited = |request: [u8; 8]| match Request::parse(&request) {
+        Some(Request::BlockUpload { at, .. }) => server.answer(Request::Upload(at).encode()),
+        _ => server.answer(request),
+    };
+    let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
+    let steps = progress(&mut transfer, |transfer| transfer.transferred(), &mut expedited);
+    assert_eq!(steps.last(), Some(&4));
 }
 
 #[test]

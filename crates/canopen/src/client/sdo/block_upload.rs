@@ -86,7 +86,7 @@ impl<S: Sink> Protocol<S> {
 
     fn on_simple(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error> {
         let progress = transfer::Protocol::on_response(&mut self.simple, data, link, now)?;
-        if progress == Progress::Continues {
+        if progress != Progress::Unexpected {
             self.phase = Phase::Simple;
         }
         Ok(progress)
