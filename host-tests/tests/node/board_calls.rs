@@ -1,5 +1,4 @@
-//! What the board tells the node and asks it, in every personality: lost events (2001h), the bit rate that it has
-//! detected, pauses for the flash.
+//! Calls of the board to the node, in every personality: lost events (2001h), the detected bit rate, pauses for the flash.
 
 use canopen::Duration;
 use host_tests::bench::{Bench, PAGES};
@@ -31,9 +30,7 @@ fn lost_events_are_counted_in_2001h_and_outlast_a_reset_of_the_communication() {
 /// A node that has detected the bit rate stores it with its next setting.
 #[test]
 fn a_detected_bit_rate_is_stored_with_the_personality() {
-    for (from, to) in
-        [(Personality::Pressure, Personality::Lift), (Personality::Encoder, Personality::Combined)]
-    {
+    for (from, to) in Personality::ALL.into_iter().zip(Personality::ALL.into_iter().cycle().skip(1)) {
         let mut bench = Bench::booted_as(from);
         bench.protocol.adopt_bit_rate(BitRate::from_kbit(125).unwrap());
         bench.write(PERSONALITY, 0, &[to.number()]).unwrap();

@@ -116,10 +116,12 @@ fn the_transfer_buffer_of_every_personality_returns_the_data_of_a_download() {
 fn the_transfer_buffer_takes_4096_bytes_and_refuses_more_before_it_forgets_them() {
     const TOO_LONG: u32 = 0x0607_0012;
     let data: Vec<u8> = (0..4096_u32).map(|number| number as u8).collect();
-    let mut bench = Bench::booted();
-    bench.write(0x2F00, 0, &data).unwrap();
-    assert_eq!(bench.write(0x2F00, 0, &[0; 4097]), Err(TOO_LONG));
-    assert_eq!(bench.read(0x2F00, 0), Ok(data));
+    for personality in Personality::ALL {
+        let mut bench = Bench::booted_as(personality);
+        bench.write(0x2F00, 0, &data).unwrap();
+        assert_eq!(bench.write(0x2F00, 0, &[0; 4097]), Err(TOO_LONG), "{personality:?}");
+        assert!(bench.read(0x2F00, 0) == Ok(data.clone()), "{personality:?}");
+    }
 }
 
 #[test]

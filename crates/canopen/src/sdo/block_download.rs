@@ -60,7 +60,6 @@ impl Receiver {
     /// client has heard it.
     pub(super) fn last(&self, has_heard: bool) -> u8 {
         match self.highest() {
-            // A whole block is followed by another one.
             0 if !has_heard => self.acknowledged,
             highest => highest,
         }

@@ -415,6 +415,14 @@ fn progress<S: Service<Output = Outcome>>(
     }
 }
 
+/// A server that answers the request for a block upload with segments or one frame, as CiA 301 allows.
+fn without_blocks(server: &mut Server) -> impl FnMut([u8; 8]) -> Vec<[u8; 8]> {
+    |request| match Request::parse(&request) {
+        Some(Request::BlockUpload { at, .. }) => server.answer(Request::Upload(at).encode()),
+        _ => server.answer(request),
+    }
+}
+
 #[test]
 fn an_upload_reports_its_progress() {
     let mut server = Server::new(&value(20));
@@ -430,21 +438,14 @@ fn an_upload_reports_its_progress() {
         [0, 0, 7, 14, 20, 20]
     );
     // The server chooses segments.
-    let mut simple = |request: [u8; 8]| match Request::parse(&request) {
-        Some(Request::BlockUpload { at, .. }) => server.answer(Request::Upload(at).encode()),
-        _ => server.answer(request),
-    };
     let mut memory = [0; 20];
     let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
+    let mut simple = without_blocks(&mut server);
     assert_eq!(progress(&mut transfer, |transfer| transfer.transferred(), &mut simple), [0, 0, 7, 14, 20]);
     // A short value comes with the first answer.
     let mut server = Server::new(&value(4));
-    let mut expedited = |request: [u8; 8]| match Request::parse(&request) {
-        Some(Request::BlockUpload { at, .. }) => server.answer(Request::Upload(at).encode()),
-        _ => server.answer(request),
-    };
     let mut transfer = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), once());
-    let steps = progress(&mut transfer, |transfer| transfer.transferred(), &mut expedited);
+    let steps = progress(&mut transfer, |transfer| transfer.transferred(), &mut without_blocks(&mut server));
     assert_eq!(steps.last(), Some(&4));
 }
 

@@ -374,7 +374,7 @@ impl Application for Length {
     }
 }
 
-/// What an application does not serve is refused, and nothing of it is answered with zeros.
+/// The device refuses a transfer that the application does not serve, and never answers with zeros.
 #[test]
 fn a_domain_that_the_application_does_not_serve_is_refused() {
     fn of<D: canopen::Definition>(mut node: Device<D>) -> (Result<Vec<u8>, u32>, Result<(), u32>) {

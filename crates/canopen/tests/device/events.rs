@@ -177,15 +177,21 @@ fn the_start_sends_the_present_state_at_once_and_starts_the_event_timer() {
     }
 }
 
+/// A device with two events, of which the first one has found no room in the queue at a SYNC.
+fn without_room(transmission: u8) -> Bench {
+    let mut bench = operational(transmission, 0, 0);
+    bench.sync();
+    bench.take();
+    bench.device.application_mut().events.extend([[1, 0, 0, 0], [2, 0, 0, 0]]);
+    bench.out.room = 0;
+    bench.sync();
+    bench
+}
+
 #[test]
 fn an_event_of_a_sync_waits_for_room_in_the_queue() {
     for transmission in [0, 1] {
-        let mut bench = operational(transmission, 0, 0);
-        bench.sync();
-        bench.take();
-        bench.device.application_mut().events.extend([[1, 0, 0, 0], [2, 0, 0, 0]]);
-        bench.out.room = 0;
-        bench.sync();
+        let mut bench = without_room(transmission);
         bench.out.room = usize::MAX;
         bench.run(MS);
         assert_eq!(told(&mut bench), [1], "without another call of the application");
@@ -242,12 +248,7 @@ fn a_sync_asks_for_no_event_of_an_event_driven_type() {
 #[test]
 fn a_sync_asks_for_no_event_while_another_one_waits_for_room() {
     for transmission in [0, 1] {
-        let mut bench = operational(transmission, 0, 0);
-        bench.sync();
-        bench.take();
-        bench.device.application_mut().events.extend([[1, 0, 0, 0], [2, 0, 0, 0]]);
-        bench.out.room = 0;
-        bench.sync();
+        let mut bench = without_room(transmission);
         bench.sync();
         assert_eq!(bench.device.application().events.len(), 1, "type {transmission}");
         bench.out.room = usize::MAX;
