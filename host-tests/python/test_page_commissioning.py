@@ -214,9 +214,15 @@ def since_activation(relay: Relay) -> list[tuple[float, str, int, str]]:
     return [(at - begin, *frame) for at, *frame in frames[place:]]
 
 
+#: The begin of the page's own requests: an upload of 1000h.
+ASKED = "40001000"
+
+
 def requests(relay: Relay, node: int) -> list[float]:
-    """The times at which the page asks a node for an upload, since the activation."""
-    return [at for at, sent, can_id, data in since_activation(relay) if (sent, can_id, data[:2]) == ("send", 0x600 + node, "40")]
+    """The times at which the page asks a node for an upload, since the activation. One request of the server's survey, which may
+    run on a busy machine, may cross the activation; the server waits for its answer and sends no other."""
+    asked = [(at, data) for at, sent, can_id, data in since_activation(relay) if (sent, can_id, data[:2]) == ("send", 0x600 + node, "40")]
+    return [at for place, (at, data) in enumerate(asked) if place > 0 or data.startswith(ASKED)]
 
 
 #: The LSS master, two nodes, their bit rate, the next one, and the switch delay in milliseconds.
@@ -244,9 +250,12 @@ def test_no_node_is_asked_while_its_bit_rate_changes(driver, master: str, nodes:
         page.script(ask)
         page.request("lss.bit_rate", kbit=new, identity=None, store=True, activate=delay)
     else:
-        # A request of the page may not cross the command, which the page does not know yet.
+        page.view("trace")
+        page.find("input[type=search]").send_keys("activate")
         assert nodectl(simulator, "lss", "--all", "set-rate", str(new), "--store").returncode == 0
         assert nodectl(simulator, "lss", "--all", "activate", str(delay)).returncode == 0
+        # A request of the page may not cross the command, which a page on a busy machine knows some time after the simulator.
+        page.says("#view-trace .frames", "activate")
         page.script(ask)
     page.until(lambda: all(len(requests(relay, node)) > 2 for node in nodes), "ask again after the change")
     page.leave()
